@@ -60,8 +60,8 @@ def entry_kernel(function):
 def cold_kernel(function):
     """Compile a `kernel` that steps seldom need: `fused` does not inline it.
 
-    LLVM copies a function that is called from one place into its caller, however long it is. What always runs there
-    then has fewer registers for its numbers, and moves them to the stack and back.
+    LLVM copies a function with one call into its caller, however long it is. The caller's usual path then has fewer
+    registers for its numbers, and moves them to the stack and back.
     """
     function.is_cold = True
     return backend.part(function)

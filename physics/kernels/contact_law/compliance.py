@@ -191,9 +191,10 @@ def _without_excess(y, end, excess, h, offset_frame, report, work):
 def correct_spring_depth(n, y, end, h, offset_frame, report, work):
     """End of a stage from y with no point deeper than its spring's due depth, and no other point in a wall.
 
-    Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
-    (Damping stops a point that turns as it does at the start of the stage: what turns less by then it leaves deeper.)
-    Friction far beyond 1 may push a point that turns more than its spring takes: that is taken from the motion.
+    The springs store at most the sum of the energy before, of the loss of motion and of the work of the loads. (Damping
+    stops a point at the turning rate of the stage's start, and leaves a point deeper whose body turns more slowly
+    later.) Friction far beyond 1 may push a turning point by more than its spring takes; this energy is taken from the
+    motion.
     """
     x, q, v, L = end
     R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * work.slop

@@ -60,8 +60,8 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, 
     the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
     frictionless impact of several contacts gains energy (Moreau; theory, section 8).
 
-    A contact that goes on from the last stage has hit nothing (`persistent_contacts`): it is brought to rest, and its
-    speed set to zero, but that is no impact.
+    A contact that continues from the last stage has hit nothing (`persistent_contacts`). It is brought to rest, and its
+    speed set to zero, without an impact.
     """
     found, rate = NO_IMPACT, 1.0 / h
     for i in range(n):

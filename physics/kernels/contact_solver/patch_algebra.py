@@ -60,7 +60,7 @@ def patch_centroid(count, patch, on):
 def fit_normal_motion(count, patch, on):
     """Normal motion that best fits the active contacts' targets: (whether one exists, centroid, (v_n, ω_a, ω_b)).
 
-    Of contacts on a line it is not finite, or no longer accurate: then there is none.
+    Contacts on a line give a motion that is not finite, or inaccurate; then there is none.
     """
     _, a, b = patch.points
     target = patch.targets[0]
@@ -213,8 +213,8 @@ def planar_motion_after(exerted, body, work):
 def patch_sliding_residual(patch, p, friction, mu, delta):
     """Largest tangential residual [m/s] if all slide, when the motion changes by delta but the directions stay.
 
-    Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
-    cone, and projections do not lengthen.
+    Only contacts with a push p > 0 count. A contact that moves backwards counts with its whole velocity: its impulse is
+    in the cone, and projections do not lengthen.
 
     Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
     """

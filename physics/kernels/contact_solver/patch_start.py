@@ -49,9 +49,9 @@ def _centroid_and_variance(n, a, b, on):
 def may_stick(n, axes, v, L, work):
     """True if friction may stop a face with the velocity v and angular momentum L before friction.
 
-    What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
-    one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
-    one that slips within the tolerance of a solve would be taken for it, and creep.
+    A sticking face stops at its wall. The pushes P remove the normal momentum, and friction, at most μP, the tangential
+    one. Its moment about the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. So the result is True for every face
+    that can stick. A face that slips within the tolerance of a solve would be taken for sticking, and creep.
     """
     ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
     va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
@@ -75,8 +75,8 @@ def cold_start_motion(n, patch, on, mu, body):
 
         v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
 
-    1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
-    φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
+    1/φ is nearly a straight line and concave. One Newton step from a point where it is at most 1 is accurate enough. A
+    face with φ(0) <= 1 would stick; it keeps a small part of its slip, since directions are needed.
     """
     _, a, b = patch.points
     u, w, inv_mass = body.u, body.w, body.inv_mass

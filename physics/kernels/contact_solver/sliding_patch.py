@@ -150,8 +150,8 @@ class NormalChoice(NamedTuple):
 def _fit_pushing_contacts(pushing, problem):
     """Choose the contacts that push, and their normal motion.
 
-    Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than its
-    target. Of the two of a rectangle it is the one that approaches less.
+    Four targets may belong to no rigid motion. Then three contacts meet their targets, and one opens that is then
+    faster than its target. A rectangle has two such choices; the contact that approaches less opens.
 
     Returns
     -------

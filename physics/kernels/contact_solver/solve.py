@@ -134,10 +134,12 @@ def _solve_sticking(n, R, v, L, work):
 def _solve_directly(n, friction, R, v, L, work):
     """Try all contacts sticking, and all sliding, the likelier first: (found, v, L, residual).
 
-    `sliding_patch` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried
-    first. Of springs none hold, nor have they a normal motion known beforehand: `sliding_patch` for one or two.
+    `sliding_patch` solves any single contact. An edge, or contacts of several walls, begin with the attempt that
+    succeeded last. Springs never stick, nor is their normal motion known beforehand; one or two of them go to
+    `sliding_patch`.
 
-    Without a loop: LLVM would work out before it what only one of the attempts needs, whether that is made or not.
+    The attempts are written without a loop. LLVM would compute, before a loop, numbers that only one attempt needs,
+    whether that is made or not.
     """
     wall, is_soft = wall_of(work.slot[0], work), contact_stiffness(work) > 0.0
     is_one_wall = n <= LANE_COUNT and wall_of(work.slot[n - 1], work) == wall

@@ -259,8 +259,8 @@ def _solve_bolt_group(group, T):
 def _restore_moment(n, group, T, work):
     """Restore the moment T of the impulses of `distribute_by_load`; True if they stay in their cones.
 
-    It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
-    that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
+    `distribute_by_load` assumes that all contacts are equally deep in the wall, which holds to a few slops. The missing
+    moment ΔT makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
     walls, c = work.walls, group.center
     mx, my, mz = T

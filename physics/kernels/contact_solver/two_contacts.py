@@ -159,8 +159,8 @@ def _direction_newton_step(pair, first, second, sliding):
 def _solve_alternately(pair, trial):
     """Let each contact answer the other's impulse in turn, starting from a trial; then try the result.
 
-    One of them was to hold or to open and does not, or turns right round: Newton's method would go on to where friction
-    pushes it along.
+    This is called when a contact that was assumed to stick or open does not, or would turn right round. Newton's method
+    would then go on to a state in which friction pushes the contact along.
     """
     W11, W12, W22, b1, b2, mu, goal = pair
     _, p, q, miss, (x1, y1), (x2, y2) = trial

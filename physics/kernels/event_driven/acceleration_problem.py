@@ -53,9 +53,9 @@ def set_up_contact(i, slot, r, target, work):
 def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, candidates):
     """Write the contact problem of candidates that do not slide into `work`; return the free (acceleration, moment).
 
-    It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
-    forces for impulses; what an arm's own motion adds to a contact's acceleration is asked of it as a target.
-    `has_sliding`: some of the candidates slide (`candidate_direction`).
+    The problem is that of an impact, with the free acceleration for the velocity, the moment τ - ω x L for the angular
+    momentum, and forces for impulses. The motion of an arm adds to a contact's acceleration, which is made part of its
+    target. `has_sliding`: some of the candidates slide (`candidate_direction`).
     """
     walls = work.walls
     scale = acceleration_scale(w, work)

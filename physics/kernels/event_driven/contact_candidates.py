@@ -95,8 +95,8 @@ def has_normal_speed(motion):
 def project_candidate_speeds(y, offset_frame, work, motion):
     """State without normal velocities of all candidates that neither approach nor leave, acting or not.
 
-    A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
-    down on the other. Where those that act have no such velocity one that has just been let go keeps its own.
+    A body may lie on two contacts and rock by less than counts. Setting it down on one contact would otherwise move the
+    other, again and again. If acting contacts have no normal speed, a contact that was just released keeps its own.
     """
     smooth, contacts, candidates, thresholds = motion.smooth, motion.contacts, motion.candidates, motion.thresholds
     if not has_open_candidate(candidates):

@@ -197,9 +197,10 @@ def try_extrapolated_step(h, offset_frame, work, motion):
 def prepare_extrapolated_step(left, offset_frame, work, motion):
     """Prepare row START for `try_extrapolated_step`; return the longest useful step.
 
-    No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, the time at which a
-    contact that is slowed as it is now stops sliding, and, flying through a field, the time in which the body crosses
-    its radius, so that no wall is reached and left again unseen.
+    The step is limited by the time `left`, by the length that the last step's errors suggest, by a turn of
+    TURN_AT_MOST, and by the time at which a contact with its present deceleration stops sliding. In flight through a
+    field it is also limited by the time in which the body moves by its radius, so that no wall is reached and left
+    again unseen.
     """
     contacts = motion.contacts
     state = get_state_row(motion.smooth, ROW_START)

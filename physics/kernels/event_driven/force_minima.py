@@ -64,7 +64,7 @@ def _cubic_interior_minimum(low, fall, high, rise, h):
 def find_force_minimum(h, used, offset_frame, work, motion):
     """Earliest time within the step of h to END at which a margin of force may be used up; h without one.
 
-    What is known of the start of the step is in START of `margin`; forces, rates and unknowns are those of END.
+    START of `margin` holds the data of the start of the step; forces, rates and unknowns are those of END.
     """
     contacts, smooth = motion.contacts, motion.smooth
     if contacts.count == 0 or used <= _CONSTANT_FORCE_RULES or not smooth.weight > 0.0:

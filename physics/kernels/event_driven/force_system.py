@@ -35,7 +35,7 @@ def _set_metric(m, P, work, unknowns):
 def _choose_rows(m, P, work, unknowns):
     """Mark rows that are no sums of others in `independent_row`, by their own metric; return their number.
 
-    Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
+    The largest entry of a positive semidefinite matrix is on the diagonal, so columns of pivots are rows, too.
     """
     _set_metric(m, P, work, unknowns)
     rank, _ = solve_full_pivot(m, unknowns.matrix, unknowns.independent_row, unknowns.value)
@@ -68,10 +68,10 @@ def _set_rows(rows, m, P, work, unknowns):
 def solve_contact_forces(m, P, work, unknowns):
     """Solve for the m unknowns that change the shares least; return total force and moment of the contacts.
 
-    Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
-    row has beyond the others, a share e of it, gives a pivot of e². Where one slides, its friction pushes elsewhere,
-    the pivot is of the order e, and a row that differs by rounding from a sum of others would still be met, by forces
-    that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
+    Rows of two contacts may be dependent. If each contact pushes along its row, the matrix shows it: a row whose
+    independent part is the share e gives a pivot of e². If one slides, its friction pushes elsewhere, and the pivot is
+    of the order e. A row that differs from a sum of others by rounding would then still be solved, by forces that stop
+    a body although no contact holds it. So where a pivot is small the rows are chosen by their own metric.
     """
     for k in range(m):
         unknowns.independent_row[k] = k

@@ -93,8 +93,8 @@ def cubic_minimum(g0, r0, g1, r1, h):
 def least_gap_margin(h, work, motion):
     """Smallest gap of the features that do not act [m] over a step of h.
 
-    Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
-    that touches and neither comes nor goes: what it is above there, and the slop.
+    For a leaving feature this is its height above the place that it left, so that a bounce does not end deeper and gain
+    energy. For one that touches and neither comes nor goes, it is the height above that place plus the slop.
     """
     smooth, thresholds = motion.smooth, motion.thresholds
     least, which = math.inf, -1
@@ -234,7 +234,7 @@ def least_start_force_margin(offset_frame, work, motion):
 def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
-    `heeds`: the guards of force count, where they are missed by more than `slack`.
+    `heeds`: True if the force guards count; they end a step when they are below zero by more than `slack`.
     """
     smooth, contacts, thresholds = motion.smooth, motion.contacts, motion.thresholds
     compute_state_rate(ROW_END, h, offset_frame, work, motion)

@@ -41,8 +41,8 @@ _ALL_AT_ONCE = -1
 def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
     """Target velocity of a contact that approaches with `speed`; stores the time of bounces that are too short.
 
-    One that leaves may be turned round, to come in at e times that speed and collide next: were it only stopped, its
-    impulse would do work on what leaves, and the energy grow.
+    A leaving contact may be reversed, to approach at e times its speed and collide next. If it were only stopped, its
+    impulse would do work on it, and the energy would grow.
 
     With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
     follow it t e/(1 - e).
@@ -74,8 +74,8 @@ def takes_part_in_impact(s, motion):
 def next_sequential_impact(work, motion, report):
     """Feature that collides alone because it approaches fastest; _ALL_AT_ONCE where all collide at once.
 
-    Which is so, too, after `_MAX_SEQUENTIAL_IMPACTS` at one moment, which the report counts as a problem not solved to
-    its tolerance.
+    All collide at once also after `_MAX_SEQUENTIAL_IMPACTS` at one moment; the report counts this as a problem not
+    solved to its tolerance.
     """
     if not motion.thresholds.is_sequential:
         return _ALL_AT_ONCE
@@ -153,8 +153,8 @@ def _solve_plastic_impact(n, contact, v, L, solved, P, work, report):
 def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
     """Result of `solve_contacts` for a collision; of an impact without rebound if that is no solution.
 
-    With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
-    asked to rebound along it and neither slides, Newton's law and Coulomb's have no solution together.
+    With friction two contacts may hold any stress along the line between them, and no impulse moves one of them along
+    it. If a rebound along the line is wanted and neither slides, Newton's law and Coulomb's have no common solution.
     """
     is_asked = False
     for i in range(n):

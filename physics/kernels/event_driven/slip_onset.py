@@ -132,7 +132,7 @@ def _slip_accelerations(angle, first, second, axes, P, work, contacts):
 def set_slip_onset_direction(P, work, contacts):
     """Set `slip_direction` of the only acting contact to the direction of the module, and place it.
 
-    More contacts than one begin in the directions that they were found with.
+    Several contacts begin to slide in the directions with which they were found.
     """
     if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
         return

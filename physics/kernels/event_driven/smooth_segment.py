@@ -65,11 +65,11 @@ def newton_time_to_gap(t, margin, guard, which, work, smooth):
 def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
     """Move the end of the step (END) to the zero of its smallest margin: (its length, guard, contact or slot).
 
-    Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
-    halved what is left. NO_STEP where a shorter step fails that was to be smooth: the margin changes its sign at a pole
-    (Painlevé), which the whole step did not see.
+    The zero of a gap is found by Newton's steps, other zeros by false position with the Illinois rule. A bisection
+    follows where PATIENCE trials have not halved the interval. NO_STEP is returned where a shorter step fails although
+    the motion should be smooth: the margin changes its sign at a pole (Painlevé), unseen by the whole step.
 
-    A force that was there at the start ends where it is zero, not where it is missed by more than rounding.
+    A force that is positive at the start ends at its zero, not where it is below zero by more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     slack = FORCE_MARGIN_TOLERANCE
@@ -128,7 +128,8 @@ def has_slip_stopped(guard, which, work, motion):
 def slide_to_stop(which, left, heeds, offset_frame, work, motion):
     """Let contact `which`, which slides slower than the limit at END, slide until it stands still: the time [s].
 
-    Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
+    The direction stays the same. Returns 0 if another event would come within it, or if the contact has only
+    begun to slide.
     """
     contacts, smooth, thresholds = motion.contacts, motion.smooth, motion.thresholds
     if contacts.is_starting[which]:
@@ -184,7 +185,7 @@ def _begin_next_step(left, offset_frame, work, motion):
 def integrate_segment(y, left, offset_frame, work, motion):
     """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
 
-    Where guards of force are not heeded one step, no longer than `watched_length`: its guard is WATCH at least.
+    Where the force guards do not count, one step is taken, at most `watched_length` long: its guard is WATCH at least.
     """
     smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds
     heeds = has_trusted_guards(motion)

@@ -128,7 +128,7 @@ def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
 def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, report):
     """Find the contact mode from y on; return whether a contact problem was solved, since the body may come to rest.
 
-    It is looked for a moment ahead where a guard has foretold that the contact mode ends.
+    If a guard has foretold the end of the contact mode, the next one is looked for a moment later.
     """
     seen, later = y, 0.0
     if is_foretold:

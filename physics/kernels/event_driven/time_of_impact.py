@@ -122,8 +122,8 @@ def gap_jerk_bound(y, left, offset_frame, work):
 def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
     """Time within which no feature at y can reach a wall, at most `left`.
 
-    Those that touch and do not come stay away for `assured_time` at least: where a push has just ended, what lifts
-    them is still zero.
+    Features that touch and do not approach stay away for `assured_time` at least: just after a push has ended, the
+    acceleration that lifts them is still zero.
     """
     x, v = y[0], y[2]
     R, _, w, alpha = free_angular_motion(y, offset_frame, work)
@@ -188,7 +188,8 @@ def count_unresolved_flight(report, work):
 def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
     """State after the time t without contact.
 
-    Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
+    A body that turns or swings faster than extrapolated steps can follow moves by time stepping for the rest of t,
+    which is reported.
     """
     if has_torque(work) or has_fields(work):
         reset_felt_flag(work)
@@ -207,8 +208,8 @@ def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
 def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
-    It may end earlier, where a feature flies so close along a wall that `_MAX_ADVANCES` steps did not tell: no wall is
-    missed.
+    The flight may end earlier, if a feature flies so close along a wall that `_MAX_ADVANCES` steps did not decide: no
+    wall is missed.
     """
     motion.contacts.count = 0
     if has_fields(work):

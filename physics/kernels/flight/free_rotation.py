@@ -87,7 +87,8 @@ MANY_TURNS = 50.0
 def write_attitude_series(J1, J2, J3, out):
     """Coefficients of the series s and d, of one body or of many at once.
 
-    Without a kernel for the bodies of a new world, since that would have to be compiled first; `attitude_series` is it.
+    For the bodies of a new world it runs without a kernel, which would have to be compiled first; `attitude_series` is
+    the kernel.
 
     Parameters
     ----------
@@ -126,8 +127,9 @@ attitude_series = kernel(write_attitude_series)
 def _half_angle(x, square):
     """(e0, 1/e0) from x = |e0 e|², that is e0² = (1 + √(1 - 4x)) / 2, by their series.
 
-    The roots would stand one after the other in the longest chain of the step. 4x = sin² of an angle up to
-    `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
+    Series replace two square roots, which would follow each other in the longest chain of the step. 4x = sin² of an
+    angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are
+    under 3e-17.
     """
     xx = x * x
     if square > TINY_SQUARE:

@@ -267,8 +267,7 @@ def matrix_rk4(y, load, inertia, h):
 def step(scheme, y, load, inertia, h):
     """One step of the scheme with code `scheme` (int); see the module for the rest.
 
-    A code that is none of the four gives a state of NaN: the layer above
-    checks the code, and this cannot be taken for a result.
+    An unknown code gives a state of NaN, which cannot be taken for a result; the layer above checks the code.
     """
     if scheme == EXPLICIT_EULER:
         return explicit_euler(y, load, inertia, h)

@@ -29,7 +29,8 @@ def clamp_command(command, limit_force, limit_torque):
 def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
     """Let `output` follow a held `command`, both (rows, 6); add its mean over the time, times `share`, to `applied`.
 
-    Of the distance between them the share `gone` has gone at the end, and `kept` is left in the mean.
+    The output covers the share `gone` of its distance to the command by the end; the share `kept` of it is missing in
+    the mean.
     """
     for i in range(command.shape[0]):
         for c in range(6):

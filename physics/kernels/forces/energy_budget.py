@@ -92,8 +92,8 @@ def _as_it_is(y, end, h, is_free, offset_frame, work):
 def limit_energy_gain(y, end, h, is_free, offset_frame, work):
     """State `end` of a stage of length h from y, without the energy that the stage created.
 
-    Where there is too little motion to pay with the body is back at y: in free flight (`is_free`) turned round, in
-    contact without velocity.
+    If the motion is too small for the excess, the body is back at y: reversed in free flight (`is_free`), without
+    velocity in contact.
     """
     if work.is_stiff == 0:
         return end

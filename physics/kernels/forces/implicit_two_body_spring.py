@@ -118,8 +118,8 @@ def _soften_pair(k, one, other, h, offset_frame):
 def hold_implicit_loads(first, count, h, offset_frame, bodies):
     """Let loads act by the implicit step over h: own fields, then springs between bodies, one after another.
 
-    A field softens the loads of a spring after the spring has: of loads that a damper makes small, even a small share
-    that is left to one of the two bodies would be large.
+    A field softens the loads of a spring after the spring itself has. A damper leaves little of its load, so even a
+    small share taken from one of the two bodies before that would be large.
     """
     for b in range(bodies.shape[0]):
         _hold_unsoftened_springs(bodies[b], h, offset_frame)

@@ -106,8 +106,8 @@ def spring_rates(state, p, J, h):
 def implicit_spring_stiffness(h, w, e, l, p):
     """Direction of a spring, and Z of `implicit_loads` along and across it [kg]; w is its points' mobility [1/kg].
 
-    Across the line it is as stiff as it is tight, k (1 - l0/l); a spring that pushes would push over, which is left
-    out.
+    Across the line the stiffness is that of its tension, k (1 - l0/l). A compressed spring would have a negative one,
+    which is left out.
     """
     spring, damper = (
         0.25 * h * h * p[SPRING_STIFFNESS],

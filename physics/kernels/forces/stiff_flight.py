@@ -33,7 +33,7 @@ _NEARLY_CONVERGED = 1.0e-3
 def implicit_flight(y, h, flight, work):
     """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from held loads.
 
-    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
+    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). If the iteration does not settle, the loads of the first step are kept.
     """
     start = acting_loads(work)
     size, loads = load_bound(start, work), start

@@ -97,7 +97,7 @@ def _common_velocities(ties, bodies):
 def _take(gain, ties, offset_frame, bodies):
     """Take an energy from the motion of all bodies; where there is too little, restore the start of the stage.
 
-    Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
+    Their common velocity is then reset to that of the start, too: the stage's result for it is as wrong as the rest.
     """
     c, start = _common_velocities(ties, bodies)
     motion = 0.0
@@ -121,7 +121,7 @@ def _take(gain, ties, offset_frame, bodies):
 def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
     """Take the energy that a stiff stage of length h created from the bodies.
 
-    `ties` is 1 where nothing but each other holds them; `first` the first body's record.
+    `ties` is 1 for bodies that are held by each other only; `first` is the first body's record.
     """
     if not _any_is_stiff(bodies.work):
         return

@@ -66,7 +66,7 @@ def is_centred(offset_frame, work):
 def may_turn(L, h, least, offset_frame, work):
     """True if a body of angular momentum L may turn by more than `least` [rad] in h: a cheap, safe bound.
 
-    A sphere does not where its centre is its centre of mass.
+    A sphere whose centre is its centre of mass never counts as turning.
     """
     if work.shape == SPHERE and is_centred(offset_frame, work):
         return False
@@ -247,8 +247,8 @@ def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, work):
 def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, work):
     """Time, at most `left`, that a stage from y may take, so that a body that turns far passes no wall [s].
 
-    In contact (n > 0) it does not fly as is foretold here: then it turns no further than a look at the end can tell. So
-    do features on a wall that others touch.
+    In contact (n > 0) the free flight of the bound does not apply; then the body turns at most as far as a test at the
+    end can judge. The same holds for features on a wall that others touch.
     """
     spin = spin_bound(y[1], y[3], h, offset_frame, work)
     if not spin * h > FAR_TURN:

@@ -23,8 +23,8 @@ _stiffness = law_parameter(LAW_STIFFNESS)  # of contact that gives (`compliance`
 def is_flight_clear(x, v, h, work):
     """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
-    The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
-    the acceleration can each take off. A contact could only matter when this is false.
+    The gap of the sphere is a parabola in time. Its lower bound is the start minus the largest losses by velocity and
+    by acceleration. A contact can matter only when this is false.
     """
     walls, a = work.walls, work.free_acceleration
     half = 0.5 * h * h
@@ -41,10 +41,10 @@ def is_flight_clear(x, v, h, work):
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """True if a feature belongs to the contact set of this stage.
 
-    It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
-    step, and than what rests as it is (`target_velocity.set_impact_targets`); and when loads can bring it to the wall
-    within the step, if it pushed in the last stage (`persistent_contacts`), or if this is the last one that the substep
-    may have.
+    A feature belongs to the set in three cases. It touches (gap <= slop). Or its speed at the wall is at most `soft`,
+    that of a fall from rest in the step, and of features at rest (`target_velocity.set_impact_targets`). Or loads can
+    bring it to the wall within the step, and it pushed in the last stage (`persistent_contacts`), or this is the last
+    stage that the substep may have.
     """
     if gap <= slop or (gap <= SIMULTANEOUS_SLOPS * slop and speed < 0.0):
         return True
@@ -159,7 +159,7 @@ def _record(count, wall, feature, features, gap, speed, work):
 def check_penetration(x, R, offset_frame, work):
     """Find features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
-    Once a feature outside the set is, the other walls are not looked at: both are true then.
+    After a feature outside the set is found, the other walls are skipped: both results are true then.
     """
     walls, shape, least = work.walls, work.shape, -0.5 * work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -188,7 +188,7 @@ def check_penetration(x, R, offset_frame, work):
 def nearest_outside_set(x, R, offset_frame, work):
     """Smallest gap [m] over all features outside the contact set, and the slot of its feature.
 
-    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
+    For a wall out of the bounding sphere's reach the sphere's gap is used: a lower bound, and positive (slot -1).
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])

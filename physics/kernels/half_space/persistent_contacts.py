@@ -67,7 +67,7 @@ def turning_acceleration(w, work):
 def is_persistent_contact(i, y, h, offset_frame, memory, work):
     """True if the speed of contact i is an error of the last stage: it pushed then, and is at most that fast.
 
-    A stage of length h can leave a contact that holds the speed that loads and turning make in it.
+    A stage of length h may leave a sticking contact with the speed that loads and turning give in h.
     """
     if not last_normal_impulse(work.slot[i], memory, work) > 0.0:
         return False
@@ -79,11 +79,12 @@ def is_persistent_contact(i, y, h, offset_frame, memory, work):
 def cancel_separation(y, h, offset_frame, memory, work):
     """State with the one contact of the set at rest along its normal, and whether it has changed.
 
-    It is changed only where the contact holds on, but h would not bring it back.
+    The state changes only if the contact continues, but would not be brought back within h.
 
-    What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
-    have. A smaller push of the next stage makes up for that. Where u is more than the motion without a push turns
-    round within h, so much is taken back, at most p: both together push. `work.rebound` has what was.
+    A contact that leaves at u after a push p, though it is still pressed against its wall, got u/(n·W n) too much. A
+    smaller push of the next stage usually compensates for that. If u is more than the motion without a push can reverse
+    within h, this excess is taken back, at most p, so that both pushes together stay positive. `work.rebound` holds the
+    old impulse.
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]

@@ -114,8 +114,8 @@ def find_rates(work, index, n, count, i):
 def find_block(work, index, z, n, i, largest, is_independent):
     """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks.
 
-    Where w_i is zero within rounding as well, i goes first, which ends the drive. The other
-    way round i would depend on the clamped ones, and rounding would decide what comes next.
+    If w_i is zero within rounding as well, i comes first, which ends the drive. Otherwise i would depend on the clamped
+    indices, and rounding would decide the next pivot.
     """
     w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
     threshold = DIRECTION_TOLERANCE * largest

@@ -25,8 +25,8 @@ def _gravity_of(world, bodies):
 def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, work):
     """Write parameters of body i, and the loads held over the step, into `work`.
 
-    gravity, friction, restitution and offset_frame are None where the scene does not have them: offset_frame, where the
-    principal axes of every body are its body axes and its geometric centre is its centre of mass.
+    gravity, friction, restitution and offset_frame are None if the scene does not have them. offset_frame is None if
+    the principal axes of every body are its body axes, and its geometric centre is its centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
     gravity = _gravity_of(world, bodies)

@@ -49,8 +49,9 @@ def _tangential(i, v, w, work):
 def _least_slip(w, h, work):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
-    What the target of a contact that held (`target_velocity.set_resting_targets`) left over in the stage before: the
-    tolerance of its solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
+    The limit is the error of a sticking contact's target (`target_velocity.set_resting_targets`) in the stage before.
+    It is the tolerance of its solve plus h² (ω α + ω³ r); for a sphere, whose arm does not turn with it, the tolerance
+    alone.
     """
     least = work.tolerance * work.acceleration * h
     if work.shape == SPHERE:
@@ -116,8 +117,8 @@ def _as_solved(n, contact, v, w, solved, free, R, h, work):
 def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
     """Result of `solve_contacts` for `free` (v, L), with friction against the mean slip if it created energy.
 
-    An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
-    impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.
+    An impulse p adds the energy p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰. In a rigid impact the normal
+    impulse outweighs this. The push of a spring depends on its depth, and may not.
 
     Parameters
     ----------

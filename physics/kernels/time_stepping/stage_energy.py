@@ -17,7 +17,7 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
 def motion_square(n, velocity, work):
     """Square of the velocity that contacts may change: without friction at one wall, only the normal part.
 
-    A body that moves along a frictionless wall, however fast, does the same as one that does not.
+    The result must not depend on the velocity of a body along a frictionless wall.
     """
     wall = wall_of(work.slot[0], work)
     if not work.mu > 0.0 and wall_of(work.slot[n - 1], work) == wall:
@@ -82,6 +82,7 @@ def _calmed_if_it_gains(n, contact, before, w, solved, free, R, h, work):
 def limit_stage_energy(n, contact, before, w, solved, free, R, h, work):
     """Result of `solve_contacts` for `free` (v, L), or of dissipative targets if that raises the energy.
 
-    If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
+    If even dissipative targets raise it, because no method solved them, the impulses are shortened until they do not.
+    Springs may give back the energy that they store.
     """
     return solved

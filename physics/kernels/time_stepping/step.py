@@ -155,10 +155,11 @@ def keep_out_of_walls(y, offset_frame, work):
 def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     """Shorten a stage over h to its first impact if a feature is through a wall at `end`: (state, time advanced).
 
-    It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
-    is through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks,
-    before which a parabola would creep along a wall that nothing hits. Impulses that no method solves may leap from
-    one time to the next. Then nothing is between, and the last state that was outside is taken.
+    The stage is shortened until the feature is within half a slop of the wall, by `parabolic_root` of its gap. If
+    another feature is through the wall by then, the search continues with that one. The gap of one feature is smooth.
+    The smallest gap of all has kinks, near which a parabola would creep along a wall that nothing hits. Impulses that
+    no method solves may leap from one time to the next. Then there is no state between, and the last one outside the
+    wall is taken.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
@@ -210,9 +211,9 @@ def advance_to_impact(n, y, h, contact, flight, records, work):
 def substep(y, start, h, contact, flight, records, work):
     """State after h, `start` after the call [s]: impacts at their times, flight or contact between them.
 
-    When a substep has used up its cuts, its rest is one plastic stage with contacts wherever it would pass a wall. Cuts
-    for what turns far (`half_space.conservative_advancement`) are counted apart. When those are used up, a body that
-    turns far is treated as one that turns little.
+    When a substep has used up its cuts, the rest of it is one plastic stage, with contacts wherever it would pass a
+    wall. Cuts for bodies that turn far (`half_space.conservative_advancement`) are counted apart. When those are used
+    up, a body that turns far is treated as one that turns little.
     """
     left, splits, cuts = h, 0, 0
     world = work.world

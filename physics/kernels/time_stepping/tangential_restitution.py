@@ -64,8 +64,8 @@ def _energy(v, L, R, work):
 def reject_energy_gain(n, contact, v, L, solved, R, work):
     """Result of `solve_contacts` for v and L, or the one without `set_tangential_targets` if that has gained energy.
 
-    A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
-    which at the same time rests on another wall can, its coefficients there being others.
+    A sphere's only contact cannot gain energy, since its motions along and across the wall do not mix. A contact of a
+    sphere that also rests on another wall can, because the coefficients differ.
     """
     if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(v, L, R, work):
         return solved

@@ -37,8 +37,8 @@ def _kept(function, called_as=PART_KIND, **options) -> Kernel:
 def part(function) -> Kernel:
     """Compile a function that other kernels call.
 
-    That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
-    is, and with it all that it calls, a copy for each call.
+    The part is marked as not to be inlined. Numba would otherwise inline it if its first caller is inlined, together
+    with all that it calls, one copy for each call.
     """
     return _kept(function, forceinline=False)
 

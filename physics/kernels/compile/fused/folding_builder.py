@@ -200,8 +200,8 @@ def _factors(value) -> tuple:
 def fused_multiply_add(builder, a, b, c):
     """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
 
-    That is said here and not left to LLVM (its flag `contract`), which would do so in one kernel and not in another,
-    depending on what else is in it.
+    The instruction is chosen here instead of by LLVM (its flag `contract`). LLVM would fuse in one kernel and not in
+    another, depending on the rest of the kernel.
     """
     width = f"v{c.type.count}" if isinstance(c.type, ir.VectorType) else ""
     type_ = ir.FunctionType(c.type, [c.type] * 3)

@@ -37,7 +37,7 @@ def infer_types(state) -> None:
 class _Network(ConstraintNetwork):
     """Network of type constraints; a constraint is checked again after the type of one of its variables has changed.
 
-    Numba looks at all of them until a round changes nothing, which is twice for most kernels.
+    Numba checks all constraints until a round changes nothing, which takes two rounds for most kernels.
     """
 
     def __init__(self):

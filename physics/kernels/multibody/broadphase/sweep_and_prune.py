@@ -34,8 +34,8 @@ def center_motion_bound(b, h, many):
 def surface_motion_bound(b, h, many):
     """Bound of the displacement of any point of body b in h without contact [m]; a turn adds at most its diameter.
 
-    The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
-    one of -√3 log(1 - θ/√3) at most, and the chord of that is no longer than 1.5 θ or 2 radii.
+    The angular velocity of a body that turns far may grow meanwhile. As |dω/dt| <= |ω|²/√3, a turn of θ at the initial
+    rate becomes at most -√3 log(1 - θ/√3). Its chord is at most 1.5 θ, or 2 radii.
     """
     t = many.bodies.twist
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))

@@ -56,8 +56,8 @@ def add_scaled(a, s, b):
 def tangent_basis(n):
     """Two unit vectors that complete the unit vector n to a right-handed frame.
 
-    The first comes from the world axis that follows the one n is most along: for a normal along a world axis the
-    frame is a permutation of the world's, exactly.
+    The first tangent comes from the world axis after the one that n is most along. So for a normal along a world axis
+    the frame is a permutation of the world's, exactly.
     """
     x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
     e = (0.0, 1.0, 0.0)
@@ -169,7 +169,7 @@ def _write_anchor(k, b, first, point, many):
 def _first_body_share(a, b, many):
     """Weight of the first body's point in the common one, for a contact whose normal belongs to no body.
 
-    1 or 0 where one body is rounder, whose point stays under its centre; 1/2 where neither comes first.
+    The weight is 1 or 0 if one body is rounder, so that its point stays under its centre, and 1/2 if neither is.
     """
     one, other = many.bodies.work[a].shape, many.bodies.work[b].shape
     if one != other:
@@ -210,7 +210,7 @@ def is_stopping(gap, speed, slop, h):
 def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     """Add a contact to the set if it touches, or could within h; return whether there was room.
 
-    What turns far touches from its `arrival_gap` on.
+    A body that turns far touches at its `arrival_gap`.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 def _carried_point(b, k, first, side, n, many):
     """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
 
-    That of a round body is where its normal is that of the contact: turning brings another point there.
+    On a round body this is the point with the contact's normal: turning brings another point there.
     """
     shape, d = many.bodies.work[b].shape, many.bodies.work[b].dims
     if shape == SPHERE:
@@ -295,7 +295,7 @@ def _carried_point(b, k, first, side, n, many):
 def _turn_frame(k, a, b, many):
     """Turn the frame of contact k with its bodies, and return its normal.
 
-    A face's normal turns with its owner, that of two spheres is along the line of their centres.
+    A face's normal turns with its body; that of two spheres stays along the line of their centres.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -314,7 +314,8 @@ def _turn_frame(k, a, b, many):
 def update_contacts(many):
     """Move arms, frames and gaps of the contact set with the bodies.
 
-    The gap between the two points along the normal; the second one of a wall is the first one projected on it.
+    The gap is the distance of the two points along the normal. On a wall, the second point is the projection of the
+    first.
     """
     for k in range(many.counts[NUM_CONTACTS]):
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]

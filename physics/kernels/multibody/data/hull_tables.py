@@ -22,8 +22,8 @@ EDGE_START, EDGE_END, EDGE_LEFT_FACE, EDGE_RIGHT_FACE = range(4)
 class Hulls(NamedTuple):
     """Tables, and scratch for a pair of polyhedra, whose first axis is the body (0 or 1) of the pair.
 
-    The pair stands in the axes of the world, with the place of the first body as origin: far from the world's nothing
-    is lost. Corners and faces are counted from 0 in each polyhedron.
+    The pair is stored in the axes of the world, relative to the place of the first body, so that nothing is lost far
+    from the world's origin. Corners and faces are counted from 0 in each polyhedron.
     """
 
     of: np.ndarray  # (bodies, 6): see above; all 0 of what is round

@@ -92,8 +92,8 @@ def _union_near_pairs(many):
 def put_quiet_groups_to_sleep(world, sleep, many):
     """Put groups to sleep whose bodies have all been quiet for long enough, with no growing motion.
 
-    Largest ways of a group in its last two windows, and whether one of it is not quiet, are gathered at its root in
-    `many.islands.group_motion`.
+    The root of each group in `many.islands.group_motion` gathers the largest displacements of its last two windows, and
+    whether any of its bodies is not quiet.
     """
     count, found = many.bodies.state.shape[0], many.islands.group_motion
     first = world * count

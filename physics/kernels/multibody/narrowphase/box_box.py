@@ -66,9 +66,10 @@ def _clip_face(a, b, face, many):
 def _parallel_edge_normal(o, out, rim, point, many):
     """Normal of two parallel edges that touch: the middle of all allowed normals.
 
-    An edge of a convex body allows every direction between the normals of its two faces: of the one block from `out`
-    to `rim`, of block o from one to the other of those whose edge passes `point`, turned round. Both hold `out`, and
-    o's ends before `rim`, a quarter turn from its other end: what both allow lies between `out` and that end.
+    An edge of a convex body allows every direction between the normals of its two faces. For the one block these are
+    the directions from `out` to `rim`. For block o they lie between the two normals, reversed, of the faces whose edge
+    passes `point`. Both ranges contain `out`, and that of o ends before `rim`, a quarter turn from its other end. So
+    both allow the directions between `out` and that end.
     """
     end, most, along = out, 0.0, qt.cross(out, rim)
     w = subtract(point, row_vector(many.bodies.center, o, 0))
@@ -162,8 +163,8 @@ def _add_edge_contact(a, b, edges, gap, h, many):
 def collide_blocks(a, b, margin, h, many):
     """Add the contacts of blocks a and b that are at most `margin` [m] apart.
 
-    Where a face separates them or nearly does, and something of the other block is above it, no product of edges can
-    say that they are further apart: that something touches.
+    If a face separates the blocks, or nearly does, and a part of the other block is above it, no product of edges can
+    have a larger distance: that part touches.
     """
     write_relative_axes(a, b, many)
     apart, face = max_box_face_separation(a, b, margin, many)

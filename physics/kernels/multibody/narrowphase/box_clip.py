@@ -39,8 +39,8 @@ def is_polygon_inside(source, count, axis, sign, bound, many):
 def clip_polygon(source, count, axis, sign, bound, side, slop, many):
     """Clip the polygon in copy `source` by sign * coordinate <= bound; return its vertices, now in the other copy.
 
-    A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
-    together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
+    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
+    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0
@@ -101,7 +101,7 @@ def clamp_to_half_width(s, bound):
 def keep_deepest_vertex(x, y, many):
     """Keep only the lowest vertex of copy 0, moved above the face of half edges x and y; return its copy.
 
-    For blocks that are apart beside each other as well: the plane between them keeps them from each other all the same.
+    This serves blocks that are apart sideways as well, since the plane between them still separates them.
     """
     p, edge, low = many.narrowphase.polygon, many.narrowphase.edge, 0
     for k in range(4):
@@ -129,8 +129,8 @@ def min_vertex_height(source, count, polygon):
 def find_rim_edge(d, axis, source, count, slop, many):
     """Edge along the face's rim that holds all low vertices of the polygon: (its ends, axis of the rim, its sense).
 
-    Vertices within a slop of the lowest one are low; two slops from the rim are on it. Without such an edge the ends
-    are -1.
+    Vertices within a slop of the lowest one are low, and vertices within two slops of the rim are on it. Without such
+    an edge the ends are -1.
     """
     p, low = many.narrowphase.polygon, min_vertex_height(source, count, many.narrowphase.polygon)
     for side in range(4):

@@ -49,7 +49,7 @@ def write_relative_axes(a, b, many):
 def max_box_face_separation(a, b, margin, many):
     """(separation, face) of the most separating face normal; a tie goes to the first block.
 
-    One that separates by more than `margin` [m] is enough.
+    The search stops at a face that separates by more than `margin` [m].
     """
     S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.work[a].dims, many.bodies.work[b].dims
     way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
@@ -110,8 +110,8 @@ def is_face_flat_on_other(face, many):
 def is_edge_axis_face_normal(edges, face, many):
     """True if the product of two edges is nearly a face normal: the faces then lie flat on each other.
 
-    Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
-    looks there may be on the far side of the one that touches.
+    Both normals point towards the other block's centre. For slender blocks that cross far from their centres, the face
+    that looks there may be on the far side of the touching one.
     """
     C, i, j, way = (
         many.narrowphase.relative_axes[AXES],

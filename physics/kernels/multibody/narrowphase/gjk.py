@@ -84,8 +84,8 @@ def _difference_point(a, b, poses, v, thinner, hulls, many):
 def closest_on_simplex(count, many):
     """Point nearest the origin of a simplex: the first `count` corners in `narrowphase.simplex` and the next one.
 
-    Only those corners stay of which it is made: (point, how many). The new one is one of them, since the point comes
-    nearer with it than without. (0, 0, 0) inside a tetrahedron.
+    Only the corners that form the point stay: (point, their number). The new corner is one of them, since the point
+    comes nearer with it than without. (0, 0, 0) inside a tetrahedron.
     """
     S = many.narrowphase.simplex
     w = row_vector(S, count, 0)

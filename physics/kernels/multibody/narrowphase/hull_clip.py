@@ -34,8 +34,8 @@ def _side_plane(which, ring, k, first, last, out, hulls):
 def _clip_polygon(source, count, m, bound, side, slop, hulls):
     """Clip the polygon in copy `source` by m·x <= bound: (its copy, its vertices).
 
-    A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
-    together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
+    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
+    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
@@ -73,8 +73,8 @@ def _has_corner(f, corner, hulls):
 def write_hull_incident_face(which, o, out, many):
     """Write a face of body o, number `which` of the pair, into copy 0; return its vertices.
 
-    Of the faces with the corner that reaches furthest against `out` the one that looks most against it: the face that
-    does so of all need not have that corner.
+    The face is the one most opposite to `out` among the faces with the farthest corner against `out`. The most opposite
+    of all faces need not have that corner.
     """
     hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):

@@ -47,7 +47,7 @@ _FIRST_EDGE_FEATURE = 2 * _MAX_FACES * 4 * CLIP_SIDE_OFFSET * CLIP_SIDE_OFFSET
 def max_hull_face_separation(which, b, other, far, many):
     """(separation, face) of the face of body b, number `which` of the pair, that is farthest from the body `other`.
 
-    Beyond `far` nothing more is looked for: that is too far already.
+    The search stops at a face farther than `far`, which is too far already.
     """
     hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     count = hulls.of[other, LAST_CORNER] - hulls.of[other, FIRST_CORNER]
@@ -78,8 +78,8 @@ def hull_edge(which, b, e, many):
 def _is_minkowski_face(d, left, right, e, other_left, other_right):
     """True if the arc between an edge's normals crosses the arc between the opposite normals of another edge.
 
-    The arc's great circle is perpendicular to the edge: its ends must be on both sides of the other's circle, and the
-    other way round, on the same hemisphere.
+    The arc's great circle is perpendicular to the edge. So the arcs cross if the ends of each lie on both sides of the
+    other's circle, and on the same hemisphere.
     """
     c, f = qt.dot(d, other_left), qt.dot(d, other_right)
     a, b = qt.dot(e, left), qt.dot(e, right)
@@ -123,7 +123,7 @@ def _edge_normal(a, b, i, j, many):
 def _keep_deepest_vertex(which, r, o, face, many):
     """Keep only the lowest vertex in copy 0 of the opposite face, moved above this face: (copy, vertices).
 
-    For bodies that are apart beside each other as well: the plane between them keeps them from each other all the same.
+    This serves bodies that are apart sideways as well, since the plane between them still separates them.
     """
     hulls, low = many.narrowphase.hulls, 0
     out = row_vector(hulls.normal[which], face, 0)
@@ -185,9 +185,9 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
 def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
-    Where a face separates them or nearly does, and something of the other body is above it, no pair of edges can say
-    that they are further apart: that something touches. Where edges do say so, and lie nearly flat on that face, what
-    is above it touches, as far away as the edges say, unless it is further away itself.
+    If a face separates the bodies, or nearly does, and a part of the other body is above it, no pair of edges can have
+    a larger distance: that part touches. If edges do have a larger distance, and lie nearly flat on that face, the part
+    above it touches at the edges' distance, unless it is farther away itself.
 
     The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: a
     choice between equals must not change with rounding.

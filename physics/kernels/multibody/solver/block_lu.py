@@ -137,7 +137,7 @@ def _eliminate_column(y, p, s, x):
 def _gauss_jordan_step(p, least, x, a, b, c, d, e):
     """Do one Gauss-Jordan step: column p, which is x, has the pivot; the others rotate past it.
 
-    Returns what pivots are above what they have to be, at least; the others, and x last.
+    Returns the pivots' least margin above their allowed size; the other columns, and x last.
     """
     value = _component(x, p)
     s = 1.0 / value

@@ -108,8 +108,8 @@ def relax_normal_impulse(k, visit, small, many):
 def sweep_normals(first, last, residual, goal, limit, many):
     """`sweep_contacts` without friction: impulses along the normals only.
 
-    A contact that has been answered is passed over until a body of it has been pushed again, and it is not answered
-    where what it is off by is a small share of the goal: where little is to be done, few contacts are visited.
+    A corrected contact is skipped until one of its bodies has been pushed again. A contact whose error is a small share
+    of the goal is not corrected. So small problems visit few contacts.
     """
     sweeps = visits = 0
     for i in range(first, last):
@@ -226,7 +226,7 @@ def _contraction_ratio(count, marks, many):
 def _extrapolate(count, ratio, number, marks, small, many):
     """Add the rest of the series of their last change to the impulses, and project them into the cones.
 
-    The motion of the bodies follows.
+    The motion of the bodies is updated, too.
     """
     s = ratio / (1.0 - ratio)
     for i in range(count):
@@ -299,9 +299,9 @@ def _sweep_until_solved(count, residual, goal, limit, many):
 def sweep_contacts(first, last, friction, residual, goal, limit, many):
     """Improve the impulses of `many.islands.contacts[first:last]` by sweeps until the residual is at most `goal` [m/s].
 
-    `contacts.impulse` and `bodies.twist` belong to each other. They hold the start, whose residual is given, and
-    receive the result. Returns the number of sweeps, `limit` at most, and the residual of the result. As many visits as
-    there are contacts count as a sweep, fewer than that as one; the last begun is finished.
+    `contacts.impulse` and `bodies.twist` are consistent. They hold the start, whose residual is given, and receive the
+    result. Returns the number of sweeps, at most `limit`, and the residual of the result. n visits for n contacts count
+    as a sweep, and so do fewer; the last sweep begun is finished.
     """
     if friction is None:
         return sweep_normals(first, last, residual, goal, limit, many)

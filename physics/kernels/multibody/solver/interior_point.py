@@ -170,8 +170,8 @@ def _batch_twist_step(g, s, many):
 def _find_step_length(part, is_corrected, many):
     """Compute the changes W dp̂ and dû for `many.newton.change`: (their largest step, p̂·û of a contact after it).
 
-    With f, what is in the batches if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
-    right where f is 0.
+    Let f be the vector in the batches if `is_corrected`, else 0. The changes satisfy W dp̂ + W⁻¹ dû = f - λ. The second
+    number is right only for f = 0.
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)

@@ -103,8 +103,8 @@ def _needs_refinement(part, speed, change, many):
 def refine_near_rest(part, friction, residual, goal, deep, least, many):
     """Refine an island that is solved to the goal and nearly at rest: (iterations, residual [m/s], method).
 
-    To `deep` where all of it holds, else by some sweeps as far as `least`. Nothing happens outside resting stages, and
-    where that would make more of the residual than the goal.
+    An island of sticking contacts is solved to `deep`, another one by some sweeps as far as `least`. Nothing happens
+    outside resting stages, or if the residual would grow beyond the goal.
     """
     fine = _refined_tolerance(goal, least)
     if many.settings[0].is_resting_stage == 0 or not fine < residual <= goal:

@@ -39,7 +39,8 @@ def subtract_twists(b, a, c, many):
 def compute_defect(part, rho, all_hold, many):
     """Write x - M⁻¹ Jᵀ p(x) of an island's bodies into `many.newton.defect`, and p(x) into the batches.
 
-    Returns its norm by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ u.
+    Returns the defect's norm weighted by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ
+    u.
     """
     _, _, begin, end = part
     for i in range(begin, end):

@@ -174,8 +174,8 @@ def _heaviest(part, many):
 def prepare_system(part, sweeps, worth, fewest, many):
     """Order the bodies for the linear system; return the iterations that an island is worth, 0 if it costs too much.
 
-    A problem that may take so many sweeps is worth `worth` times their work, and dear where that is fewer than `fewest`
-    iterations: this is known before much work went into it.
+    A problem with so many sweeps allowed is worth `worth` times their work. It costs too much if that pays for fewer
+    than `fewest` iterations. This is known before much work is done.
     """
     first, last, begin, end = part
     contacts, worth = (last - first) * _CONTACT_COST, worth * sweeps * (last - first) * _SWEEP_COST
@@ -222,8 +222,8 @@ def is_every_contact_pushing(part, many):
 def try_all_sticking(part, friction, residual, enough, many):
     """Try impulses with every contact sticking, and keep them if the residual falls; return it, `enough` at best [m/s].
 
-    The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
-    stands still is solved so far below the goal that the steps to come find nothing to do.
+    The law is then linear, so its matrix is factored once, and a few rounds of q = p(x) cost little more than one. A
+    resting stack is solved so far below the goal that the next steps find nothing to do.
     """
     first, last, begin, end = part
     rho = _STICK_RHO * _heaviest(part, many)

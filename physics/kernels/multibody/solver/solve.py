@@ -188,7 +188,7 @@ def is_island_inactive(part, goal, many):
 def _is_swept_first(part, goal, scale, many):
     """True if an island is first solved by sweeps: it has one contact, or an impact at a coarse tolerance.
 
-    An impact begins from no impulses, and asks something of the few contacts near it.
+    An impact starts without impulses, and involves only the few contacts near it.
     """
     is_impact = many.settings[0].is_resting_stage == 0
     return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
@@ -198,7 +198,7 @@ def _is_swept_first(part, goal, scale, many):
 def solve_island(part, friction, scale, residual, goal, deep, many):
     """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method).
 
-    What holds is solved to `deep` [m/s].
+    Islands of sticking contacts are solved to `deep` [m/s].
     """
     first, last, _, _ = part
     limit, count = many.settings[0].sweeps, 0
@@ -261,7 +261,7 @@ def max_body_speed(many):
 def solve_island_frictionless(part, friction, goal, many):
     """Solve for impulses along the normals only, from none; return the residual of the problem with friction [m/s].
 
-    The last resort, where the methods for friction went astray: these sweeps never raise the energy.
+    This is the last resort, after the methods for friction have failed: these sweeps never raise the energy.
     """
     first, last, _, _ = part
     clear_island_impulses(part, many)
@@ -282,11 +282,11 @@ def solve_all_frictionless(n, many):
 def solve_contacts(n, friction, many):
     """Solve for `many.contacts.impulse` from the warm start in it: (iterations, relative residual, method).
 
-    `many.bodies.twist` holds the velocities without any contact impulse and receives those with them. The residual is
-    measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
-    where all of those are next to rounding, to that speed of which the rounding of velocities or of impulses is the
-    tolerance's share; or, in a part of a substep, to what loads give in half of it (`adaptive_substep`).
-    Iterations are those of the island that took most.
+    `many.bodies.twist` holds the velocities without contact impulses, and receives those with them. The residual is
+    measured on the returned impulses, relative to a speed. This speed is the largest velocity that a contact would have
+    without impulses. If all of those are close to rounding, it is the speed at which the tolerance equals the rounding
+    of velocities or impulses. In a part of a substep it is the speed that loads give in half of it
+    (`adaptive_substep`). Iterations are the largest number of any island.
     """
     save_free_twists(many)
     tolerance = many.settings[0].tolerance

@@ -61,7 +61,7 @@ def _save_snapshot(slot, world, kept, memory, report, many, counts):
 def _restore_snapshot(slot, world, kept, memory, report, many, counts):
     """Restore the saved state of the world, except the work counted by the report.
 
-    Events logged since are no more: their rows are written over.
+    Events logged since then are dropped: their rows are overwritten.
     """
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
@@ -84,7 +84,7 @@ def _length(a):
 def _body_error(b, offset_frame, kept, many):
     """Distance of body b from its state `SNAPSHOT_COARSE`, in its radius; and the difference in velocity, in its speed.
 
-    Of its speed counts no less than what its loads give it over its radius.
+    The speed counts as at least the speed that the body's loads give it over its radius.
     """
     body = many.bodies.work[b]
     x, q, v, L = read_state(many.bodies.state, b)
@@ -149,8 +149,8 @@ def _step_with_halving(world, start, unit, part, shortest, switches, kept, recor
 def _min_load_speed(h, many):
     """Least speed that a body gains by its loads in h [m/s].
 
-    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be
-    less than rounding leaves where bodies turn on edges, and no error is as small.
+    The solves of a part are at least as coarse as those of the halves in which every substep is taken. A finer goal
+    would be below the rounding of bodies that turn on edges, and no error is as small.
     """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
@@ -162,8 +162,8 @@ def _min_load_speed(h, many):
 def step_with_error_control(world, start, h, switches, kept, records, many):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
-    Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
-    substep is longer from there on.
+    If the shortest part does not meet the error either, it counts as a fallback, and the shortest part is longer for
+    the rest of this substep.
 
     `switches` are `MultibodySwitches`; `kept` is what `allocation.make_snapshots` makes.
     """

@@ -55,8 +55,9 @@ _ARRIVAL_FRACTION = 0.5
 def write_spin_bounds(h, offset_frame, many):
     """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; return whether any may.
 
-    Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
-    by less than `FAR_TURN` it gets no faster by a factor of √2 (see `conservative_advancement.spin_bound`).
+    A cheap test settles most bodies. Loads turn a body by at most h times its acceleration over its radius. While it
+    turns by less than `FAR_TURN`, its spin grows by less than a factor of √2 (see
+    `conservative_advancement.spin_bound`).
     """
     least, found = FAR_TURN, False
     if many.settings[0].is_error_controlled == 1:
@@ -190,8 +191,8 @@ def _load_acceleration(b, n, many):
 def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
     """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived, or will not [s].
 
-    Bodies in contact do not fly as is foretold here, nor do those that touch each other: they turn no further than a
-    look at the end can tell.
+    The free flight of the bound does not apply to bodies in contact, nor to a pair that touches. These turn at most as
+    far as a test at the end can judge.
     """
     touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
     one = read_state(many.bodies.state, a)

@@ -46,8 +46,8 @@ def has_gained_energy(n, h, many):
     """True if the impulses of a resting stage of n contacts raised the energy beyond the errors of solve and step.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
-    a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what
-    its bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
+    a residual r = tolerance · s, with the largest free speed s, and so give ½ p r. In a tower this is far more than the
+    energy of its bodies. No contact needs an impulse p above the sum F of all loads to hold them; the rest is strain.
     """
     gain = size = fastest = F = 0.0
     for b in range(many.bodies.state.shape[0]):
@@ -139,8 +139,8 @@ def free_lift_work(b, many):
 def clamp_body_inside_walls(b, offset_frame, many):
     """Move a body whose centre is behind a wall inside, without that velocity; return whether it was behind.
 
-    Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that
-    move with that say nothing about where the centre goes.
+    Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,
+    and its points then say nothing about the way of the centre.
     """
     body, was_outside = many.bodies.work[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])

@@ -42,7 +42,8 @@ FORETOLD = -1.0e299
 def _rest_speed(k, many):
     """Speed that loads give contact k within `rest_share` of the substep [m/s].
 
-    Of all of it, however little is left after an impact of others: else those would make what rests bounce.
+    The whole substep counts, even if little of it is left after an impact of others; else such impacts would make
+    resting bodies bounce.
     """
     return many.settings[0].rest_share * relative_acceleration_bound(k, many) * many.settings[0].substep
 
@@ -58,7 +59,8 @@ def is_bouncing(k, many):
 def rest_speed_limit(k, h, many):
     """Largest speed that the resting stage may stop [m/s].
 
-    What loads give within `rest_share` of the substep, or what goes in by a few slops only until the middle of h.
+    The limit is the speed that loads give within `rest_share` of the substep, or one that closes a few slops until the
+    middle of h.
     """
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     return max(2.0 * _SOFT_LANDING_SLOPS * slop / h, _rest_speed(k, many))
@@ -68,8 +70,8 @@ def rest_speed_limit(k, h, many):
 def impact_speed_limit(k, h, many):
     """Least speed of contacts to be met in time [m/s]: it closes `_FAST_RADIUS_SHARE` of the smaller radius within h.
 
-    Under error control (`adaptive_substep`) all that is not slow, so that no part has to be as short as the error of
-    where bodies meet.
+    Under error control (`adaptive_substep`) every contact that is not slow is met in time. Else parts would be as short
+    as the error in the place of a meeting.
     """
     one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     radius = many.bodies.work[one].radius
@@ -97,7 +99,7 @@ def _pair_touches(k, step, many):
 def is_left_to_advancement(k, many):
     """True if `conservative_advancement` finds the time of contact k, because a body turns far.
 
-    It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
+    It serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)):
@@ -118,7 +120,8 @@ def is_impact_ahead(k, h, many):
 def _impact_target(k, h, many):
     """Target of contact k in an impact, and whether it collides: others may leave it unchanged.
 
-    What leaves may be turned round to e times its speed, Moreau's law: without it a struck chain could gain energy.
+    A leaving contact may be reversed to e times its speed, as in Moreau's law; without this a struck chain could gain
+    energy.
     """
     speed = many.contacts.speed[k]
     if speed > 0.0 or is_bouncing(k, many):
@@ -154,8 +157,8 @@ def set_impact_targets(n, h, is_last, many):
 
     See `physics.kernels.contact_law.target_velocity.set_impact_targets`.
 
-    What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
-    until the middle of it, is left to the resting stage, unless it is fast.
+    A contact is left to the resting stage, unless it is fast, in two cases: its speed is at most the one that loads
+    give within `rest_share` of the step, or it would close only a few slops until the middle of the step.
     """
     fastest, is_impact = -1, False
     for k in range(n):
@@ -206,7 +209,7 @@ def _mark_bodies(k, many):
 def constrain_coupled_contacts(n, many):
     """Keep contacts without a target if their bodies are in other contacts of the set, or in contacts kept for this.
 
-    Loads alone do not bring them together in this stage, but what pushes these bodies may.
+    Loads alone do not close these contacts in this stage, but pushes on their bodies may.
     """
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
@@ -231,7 +234,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
 
-    In turn only the one that approaches fastest gives an impulse: the step comes back for the others.
+    With impacts in turn only the fastest approaching contact gives an impulse: the step comes back for the others.
     """
     fastest = set_impact_targets(n, h, is_last, many)
     meeting = time_to_first_impact(n, h, is_last, many)
@@ -253,9 +256,8 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
 def time_to_first_impact(n, h, is_last, many):
     """Time until the first meeting that matters, at most h [s]; never too late.
 
-    Two points approach by at most s t + a t²/2 with a the bound of their acceleration by loads and turning, so
-    that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). What turns far is looked at by
-    `conservative_advancement`.
+    Two points approach by at most s t + a t²/2, with a bound a of their acceleration by loads and turning. So the gap
+    lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). `conservative_advancement` serves bodies that turn far.
     """
     first = h
     if is_last:

@@ -64,7 +64,8 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 def _centripetal(b, k, first, side, h, many):
     """ω x ṙ of one end of contact k, world frame [m/s²].
 
-    0 of a sphere, whose point of contact does not turn, and where it says nothing about the end of a stage of length h.
+    It is 0 for a sphere, whose contact point does not turn, and where a body turns too far for it to describe the end
+    of a stage of length h.
     """
     shape, w = many.bodies.work[b].shape, row_vector(many.bodies.twist, b, 3)
     if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
@@ -81,7 +82,7 @@ def _centripetal(b, k, first, side, h, many):
 def _coriolis(k, many):
     """Half of the change, by the normal's turning, of the relative velocity along it [m/s²]: n·(ω x u).
 
-    A point that slides at u on a face that turns at ω meets it where another normal was: the gap's second derivative
+    A point that slides at u on a face, which turns at ω, meets other normals on its way. So the gap's second derivative
     has 2 n·(u x ω) beside the accelerations of the points.
     """
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
@@ -94,9 +95,9 @@ def _coriolis(k, many):
 def set_resting_targets(n, h, many):
     """Set the targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
 
-    A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
-    Under error control, what a point on a circle has risen by then is no gap: it would make the velocity an
-    error of first order.
+    A contact with a gap at the start may close the rest of it, measured at the middle, in the second half. Under error
+    control the rise of a point on a circle until then does not count as a gap: it would make the velocity an error of
+    first order.
     """
     half = 0.5 * h
     for k in range(n):

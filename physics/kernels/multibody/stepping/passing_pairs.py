@@ -157,9 +157,9 @@ def _fastest_stopping(first, last, h, many):
 def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     """Replace the contacts of a passing pair by one, at `to`; k is its fastest contact, of n in the set.
 
-    Returns whether it passes, and the contacts of the set from then on. A contact that lands along its own direction
-    stays. So does that of bodies that touch along the plane between them, unless it goes deeper than they are thinned
-    by along any direction. Bodies that nothing else can push have no contact.
+    Returns whether the pair passes, and the new number of contacts. A contact that lands along its own direction stays.
+    So does a contact of bodies that touch along the plane between them, unless it is deeper than their thinning along
+    any direction. Bodies that nothing else can push have no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     thinner = _thinning(a, b, n, h, many)

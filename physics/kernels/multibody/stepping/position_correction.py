@@ -54,7 +54,7 @@ _DEEP_SWEEPS = 1000
 def _set_displacement_targets(n, many):
     """Set the target displacements along the normals: (deepest penetration, negligible error of a displacement [m]).
 
-    The penetration is in slops of its pair: from 1 on there are some displacements.
+    The penetration is in slops of its pair; displacements begin at 1.
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
@@ -114,8 +114,8 @@ def _share_that_takes(energy, stock):
 def _take_relative_energy(a, b, energy, many):
     """Take energy [J] from the relative motion of two bodies, with both momenta kept; return whether it sufficed.
 
-    First from their velocity along the line of centres, then from the difference of their spins, with an inertia no
-    larger than any of theirs. Nothing is taken where both have less.
+    The energy comes first from the velocity along the line of centres, then from the difference of their spins, with
+    the least of their moments of inertia. Nothing is taken if both have less.
     """
     inverse = many.bodies.inv_mass[a] + many.bodies.inv_mass[b]
     way = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
@@ -141,8 +141,8 @@ def _take_relative_energy(a, b, energy, many):
 def _keep_angular_momentum(n, many):
     """Turn the bodies of each contact, to keep the angular momentum that pushing their centres apart would add.
 
-    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both take up a part by their m r²: the same angular
-    velocity, as if they were one body. The energy that this adds is noted in `many.contacts.rebound_impulse`.
+    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both bodies take up a part by their m r²: they get
+    the same angular velocity, as if they were one. `many.contacts.rebound_impulse` stores the added energy.
     """
     for k in range(n):
         a, b, p = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.impulse[k, 0]
@@ -171,7 +171,8 @@ def _spin_energy(b, many):
 def _pay_for_spins(n, offset_frame, many):
     """Take the energy that `_keep_angular_momentum` has added from the relative motion of the bodies.
 
-    What is more than they have, and more than next to nothing, comes from their spins, and momentum with it.
+    An energy beyond that of the relative motion, and beyond a negligible one, is taken from the bodies' spins, which
+    changes their momentum.
     """
     for k in range(n):
         a, b, gain = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.rebound_impulse[k, 0]

@@ -118,7 +118,7 @@ def _apply_frictionless(n, offset_frame, many):
 def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
     """Solve and apply the n contacts of an impact, with the largest rebound that creates no energy.
 
-    With friction the law itself may ask for more than there is; without, what a loose solve leaves.
+    With friction the law itself may require more energy than there is; without friction a loose solve may create some.
     """
     _save_momenta(_PRE_IMPACT, many)
     before = world_kinetic_energy(offset_frame, many)

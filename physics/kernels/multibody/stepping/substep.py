@@ -53,7 +53,7 @@ OVERLAP_SHARE = 1.0e-2
 def record_penetration(n, world, memory, report, many):
     """Record the set's deepest penetration in the world's report, and the number of contacts without room.
 
-    Nothing is remembered, not even the length of a stage, where the bodies were put: what overlaps there is told.
+    After bodies were placed by a user the memory is empty, even of a stage's length; their overlap is reported.
     """
     is_start = memory[world, WARM_STAGE_LENGTH] == 0.0
     for k in range(n):
