@@ -120,7 +120,7 @@ def _given(array: np.ndarray) -> str:
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
     """Copy `value` to `target`, a contiguous float64 array (worlds, bodies, n); `value` as in `batch`, all finite.
 
-    Copied and looked at in one pass: after an error `target` is changed, too. For what is handed in with every step.
+    The copy and the check are one pass, for arrays of every step. After an error `target` is changed, too.
     """
     if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
         array = value

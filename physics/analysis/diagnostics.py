@@ -50,8 +50,8 @@ class Diagnostics:
 def diagnose(world: World) -> Diagnostics:
     """Return energy, momenta and gaps of every body of `world` now.
 
-    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
-    and springs of contact.
+    Kinetic energy is ½ P·v + ½ L·ω. Potential energy is -m g·x, plus the energies of fields (`Field.energy`) and of the
+    springs of contact.
     """
     validation.instance(world, World, "world", "a physics.World")
     return _diagnose(world)

@@ -122,7 +122,7 @@ def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pa
 def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: float) -> list[Event]:
     """Contacts that began and ended between two samples, from `last_pushes` at both; the later sample is at t [s].
 
-    A contact ends when it last pushed: a contact that no longer pushes stays in the set until its gap exceeds the slop.
+    A contact ends at its last push. It stays in the set after that until its gap exceeds the slop.
     """
     began = [("touch", pair, t) for pair in now.keys() - before.keys()]
     ended = [("release", pair, before[pair]) for pair in before.keys() - now.keys()]

@@ -42,9 +42,9 @@ class _Chapter:
 class Recorder:
     """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
 
-    It is told of every step, whoever takes it (`World.step`, `Stepper`, an environment), and of every change by
-    `set_state`, `set_parameters` and `restore`; arrays of the world written past these are not seen. Worlds are
-    independent, so that a file holds one world only. Without a recorder a step does nothing for it.
+    The recorder sees every step of `World.step`, of a `Stepper` and of an environment. It sees every change by
+    `set_state`, `set_parameters` and `restore`, but not arrays of the world written directly. Worlds are independent,
+    so a file holds one world only. A world without a recorder does no work for it.
 
     Parameters
     ----------

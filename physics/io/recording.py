@@ -259,7 +259,7 @@ class Replay:
     def tolerance(self) -> float:
         """Tolerance of the comparison: 0 (bits), or `OTHER_COMPILER` if the recording's compiler rounds differently.
 
-        A state may differ by so much of itself, and of 1 of its unit.
+        A number x of a state may differ by the tolerance times (1 + |x|).
         """
         makers = {self.recording.origin["compiler"], COMPILER}
         return OTHER_COMPILER if FUSED in makers and len(makers) > 1 else 0.0

@@ -32,7 +32,7 @@ COMPILE_NOTICE = 1.0
 def compiled(kernel: Callable, arguments: tuple) -> Callable:
     """Machine code of a kernel for arguments of these types.
 
-    To call it leaves out Numba's dispatcher, which finds out the types of all arguments in each call.
+    A call of machine code skips Numba's dispatcher, which determines the types of all arguments in each call.
     """
     with backend.LOCK, compiling():
         return backend.machine_code(kernel, arguments)
@@ -71,7 +71,8 @@ _ENTRIES: dict[tuple, object] = {}
 def compiling():
     """Print on standard error that a kernel is being compiled, if this takes noticeably long.
 
-    The garbage collector looks at Numba's growing tables less often: it would take a tenth of the time, or a fifth.
+    Meanwhile the garbage collector scans Numba's growing tables less often; it would take a tenth or a fifth of the
+    time.
     """
     text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
     timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))

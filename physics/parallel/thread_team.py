@@ -79,7 +79,7 @@ class Team:
     def run(self, calls: Sequence[Work]) -> None:
         """Make the calls, one per thread, the first in the calling thread.
 
-        A call is left out if its thread has not begun when all worlds are taken: it lists no worlds then.
+        A call is skipped if its thread has not begun before all worlds are taken; its list of worlds is then empty.
         """
         if self.size == 1:
             if calls[0].perform():

@@ -327,8 +327,8 @@ class Ellipsoid(Body):
 class Hull(Body):
     """The convex hull of points, of uniform density: a wedge, a prism, a rock.
 
-    `pos` is the centre of mass, as of every body: the hull is shifted there. Where that is in the frame of the points
-    says `centroid`, so that a body whose points stand where it is to be in the world has ``pos=hull.centroid``.
+    `pos` is the centre of mass, as for every body: the hull is shifted there. `centroid` is the centre of mass in the
+    frame of the points. So a hull whose points are given in the world has ``pos=hull.centroid``.
 
     Parameters
     ----------

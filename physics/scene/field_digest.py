@@ -16,8 +16,8 @@ from physics.kernels.compile.decorators import backend, is_compiled, plain_funct
 def digest(*functions: Callable | None) -> str:
     """Hexadecimal digest of everything that decides the machine code of these functions.
 
-    Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
-    name the source.
+    The digest covers their code, and the numbers and functions that they read from around them, recursively. Of other
+    modules that they name it covers the source.
     """
     found = hashlib.sha256()
     seen: set[int] = set()
@@ -81,7 +81,7 @@ def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
 def as_it_is(function: Callable) -> Callable:
     """Function without machine code from before an edit of the globals that it reads.
 
-    Numba takes the numbers and functions that a function reads when it compiles it, and never again.
+    Numba reads the numbers and functions around a function when it compiles it, and never again.
     """
     key = plain_function(function), digest(function)
     if key not in _AS_IT_IS:

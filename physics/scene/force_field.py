@@ -114,7 +114,7 @@ class Field(Effect):
     def is_steady(self) -> bool:
         """True if the field's effect on a resting body is constant in time; unknown for a user's own fields.
 
-        `Sleeping` needs to know: under a load that may change on its own nothing sleeps.
+        `Sleeping` needs this: under a load that may change on its own nothing sleeps.
         """
         return False
 

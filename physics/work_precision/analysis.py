@@ -41,9 +41,9 @@ def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -
 def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
     """Indices of the smallest steps over which the error no longer falls, finest first; empty while it still falls.
 
-    From the finest step on towards coarser ones, as long as the coarser one's error is not larger than the finer one's
-    by more than the `FLAT_ORDER`-th power of their ratio. A single step is no tail. A mere lucky value in the middle
-    is none either: the finer steps after it fall again.
+    The tail grows from the finest step towards coarser ones, while the coarser one's error is at most the finer one's
+    times the `FLAT_ORDER`-th power of the ratio of the steps. A single step is no tail. A lucky value in the middle is
+    none either: the finer steps after it fall again.
     """
     order = [i for i in np.argsort(steps, kind="stable") if math.isfinite(errors[i])]
     tail = order[:1]

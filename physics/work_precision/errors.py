@@ -44,8 +44,8 @@ def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
 def root_mean_square(difference: np.ndarray) -> float:
     """Root of the mean over the samples of |difference|² of the worst body; `difference` is (samples, bodies, 3).
 
-    Velocities are compared in the mean: an impact that comes a moment early makes an error as large as the impact
-    itself between the two moments, however short that is.
+    Velocities are compared in the mean. An impact a moment early makes an error as large as the impact between the two
+    moments, however close they are.
     """
     return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
 
@@ -83,8 +83,9 @@ def _field_laws(scene: Scene) -> list[bool | None]:
 def energy_error(scene: Scene, energy: np.ndarray) -> float:
     """Violation of the energy's law by the energy [J] (samples, bodies); bodies must not exchange energy.
 
-    Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
-    nothing passive has; only a truth can tell the right losses. Not a number where a field may give energy.
+    For conserved energy this is the largest departure from the start. Else it is the largest rise above an earlier
+    value, which a passive scene never has; only a truth can tell the right losses. Not a number where a field may give
+    energy.
     """
     if None in _field_laws(scene):
         return float("nan")
@@ -121,8 +122,8 @@ def _support(body: Body, direction: np.ndarray) -> np.ndarray:
 def event_error(events: Sequence, true: Sequence) -> float | None:
     """Worst difference of the times of the same events [s]; None if no events can be matched.
 
-    Events are paired by kind, in order of time, and only those kinds count of which both have equally many: with one
-    more or less of them, which belongs to which would be a guess. A fault is no event of the scene.
+    Events are paired by kind, in order of time. A kind counts only if both runs have equally many events of it;
+    otherwise a pairing would be a guess. A fault is no event of the scene.
 
     Parameters
     ----------

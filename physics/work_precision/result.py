@@ -164,7 +164,7 @@ class Frontier:
     def plateau(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
         """Error that smaller steps of a setting do not improve; None while its error still falls.
 
-        Rounding where the setting converges, its tolerances where they are coarser, or its model.
+        Its cause is rounding if the setting converges, its tolerances if they are coarser, or its model.
         """
         some = [p for p in self.of(setting, engine) if not p.is_lost]
         return frontier_analysis.plateau([p.dt for p in some], [self.error(p, measure) for p in some])

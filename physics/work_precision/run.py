@@ -53,7 +53,7 @@ def ladder(
 ) -> list[tuple[Preset | Accuracy, float]]:
     """Every accuracy at every step [s]: the `settings` of `frontier`.
 
-    Without `steps`: at `STEPS`, and what is event-driven at `COARSE_STEPS`, too.
+    Without `steps` the steps are `STEPS`, and for event-driven settings also `COARSE_STEPS`.
     """
     if isinstance(accuracies, (str, Accuracy)) or not isinstance(accuracies, Iterable):
         raise ValueError(f"accuracies is {shown(accuracies)}; allowed is a list of presets and physics.Accuracy(...)")
@@ -84,7 +84,7 @@ def frontier(
     """Measure error against time for one scene.
 
     Every setting is run, compared with the truth and timed on one thread, in turns with the others. An interruption
-    (Ctrl-C) ends the measurement, not the program: what was done by then is returned.
+    (Ctrl-C) ends the measurement, not the program: the results until then are returned.
 
     Parameters
     ----------

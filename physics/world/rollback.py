@@ -11,7 +11,7 @@ from physics.world.batch import Batch
 class Before:
     """Copy of a world's whole state before a step that may raise an exception (`Plan.may_raise`).
 
-    By then the kernel has advanced some worlds of the batch, and not the others.
+    When an exception is raised, the kernel has advanced some worlds of the batch, but not all.
 
     Parameters
     ----------

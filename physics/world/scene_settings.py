@@ -17,7 +17,7 @@ NUMBERS_IN_PLAN = (Actuator, Sleeping)
 def scene_settings(scene: Scene) -> dict[str, str]:
     """Settings of a scene by name, as text that can be compared, shown and kept in a file.
 
-    Sizes, masses, inertias and the numbers of most effects are none of them: they are parameters of each world.
+    They exclude sizes, masses, inertias and the numbers of most effects, which are parameters of each world.
     """
     return {
         "bodies": ", ".join(map(_body, scene.bodies)),

@@ -56,7 +56,7 @@ def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution
 def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str = "start") -> None:
     """Give worlds new states and new parameters at once; after an error nothing has changed.
 
-    Both are checked together: neither the old state with the new sizes nor the reverse needs to be possible.
+    States and parameters are checked together: the old state need not be possible with the new sizes, nor the reverse.
 
     Parameters
     ----------
@@ -156,8 +156,8 @@ def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse two touching bodies with their centres in the same place, which have no shortest way apart.
 
-    Bodies in the same place are neighbours in the order along any direction, and in that along one that no scene is
-    built along hardly any others are.
+    Bodies in the same place are neighbours in the order along any direction. Along a direction that scenes seldom use,
+    hardly any other bodies are neighbours.
     """
     shape = (len(chosen), world.body_count)
     centres = geometric_centres(world, state, params).reshape(*shape, 3)

@@ -139,9 +139,9 @@ class World(Batch):
     def make_event_room(self, room: int) -> None:
         """Give a step's log room for `room` events per body, 0 at first; for `simulate`.
 
-        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in
-        `physics.kernels.time_stepping.event_log`; their number to `event_counts` (worlds * bodies,) int64, those that
-        found no room included: more than `room` says so. Prepare a `Stepper` after this.
+        Events go to `event_log` (worlds * bodies, room, EVENT_SIZE), with columns in
+        `physics.kernels.time_stepping.event_log`. Their number goes to `event_counts` (worlds * bodies,) int64, and
+        includes events without room. Prepare a `Stepper` after this.
         """
         self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
         self._bound_for = None
@@ -210,8 +210,8 @@ class World(Batch):
     def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Run the `kernel_calls` of some steps of `dt` [s] with this wrench, for callers that prepare them.
 
-        A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
-        Where a user's field raises an exception nothing has changed.
+        A `Stepper` skips this function if one call is enough; `stepper._is_all` lists the other parts of a step. If a
+        user's field raises an exception nothing has changed.
         """
         before = Before(self) if self._may_raise else None
         try:

@@ -106,7 +106,7 @@ def end(is_complete: bool, lacking: str = "") -> None:
 def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
     """Return the path of a plot if matplotlib is installed, and the message for `end` if it is not.
 
-    The line is printed at once, too: whoever wants the plot need not wait for the measurement.
+    The message is also printed at once, before the measurement, so that a user can still stop it.
     """
     from rigid_env.lab.measure.plotting import lacks_matplotlib
 

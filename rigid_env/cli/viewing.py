@@ -73,7 +73,7 @@ def _export(what: str, path: Path, duration: float, settings: dict, console) -> 
 def _serve(what: str, host: str, port: int, browser: bool, settings: dict, console) -> None:
     """Serve until Ctrl-C or SIGTERM; print the address once the subject of the viewer is ready.
 
-    A canonical scene is sure. The browser then loads the page while the engine is imported.
+    For a canonical scene the address is printed at once. The browser then loads the page while the engine is imported.
     """
     from rigid_env.viewer.servers import start_viewer_server, stop_server
 

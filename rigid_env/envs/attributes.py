@@ -76,8 +76,8 @@ SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
 class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
     """`call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
 
-    What Gymnasium's `SyncVectorEnv` asks of its environments one by one is here a look into the batch. Names that
-    mean nothing for one world of it are refused, never ignored.
+    Gymnasium's `SyncVectorEnv` calls its environments one by one; here each call reads the batch. Names without a
+    meaning for a single world of it are refused, never ignored.
     """
 
     task: Any

@@ -31,8 +31,8 @@ def check_task(
 ) -> None:
     """Check a task as an environment.
 
-    Gymnasium's `check_env`; the same numbers in a batch as alone, for the same seeds, in later episodes, too, in all
-    modes of starting anew; seeds; copies by `pickle`; workers.
+    It runs Gymnasium's `check_env`. It compares a batch with single environments for the same seeds, also in later
+    episodes and in all modes of automatic reset. It checks seeds, copies by `pickle`, and worker processes.
 
     Parameters
     ----------

@@ -298,8 +298,8 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     def _generators_of_ended(self) -> list[tuple[Any, Any]]:
         """Random generators of worlds whose episodes ended, each with its state.
 
-        In mode ``NextStep`` they move in the step that starts them anew; a disturbance due then must not take numbers
-        of the next episode.
+        In mode ``NextStep`` ended worlds move in the step that restarts them. A disturbance due in that step must not
+        use numbers of the next episode.
         """
         if self.task.disturbed is None:
             return []

@@ -151,7 +151,7 @@ class ShadowLayer:
     def _add_wall(self, camera, lit, poses, groups):
         """Count the samples that are dark on one wall; returns the rows of pixels that it may have darkened, or None.
 
-        Whole rows are added up: they are contiguous, which is worth more than leaving out their ends.
+        Whole rows are added up, since contiguous memory saves more time than skipping the rows' ends.
         """
         may_show = _may_show(lit, poses)
         drawn = []

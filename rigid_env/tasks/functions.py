@@ -16,8 +16,8 @@ from rigid_env.tasks.worlds import Worlds
 class Functions:
     """Calls of the functions of a task without compiled ones.
 
-    Each function is called once when this is made, in a world at its start, so that a mistake shows at once: a
-    rehearsal, with values that are drawn for it.
+    Each function is called once when the object is made, in a world at its start, with drawn values. This rehearsal
+    shows a mistake at once.
 
     Parameters
     ----------

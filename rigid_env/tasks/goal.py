@@ -19,8 +19,8 @@ REWARDS = ("sparse", "dense")
 class GoalTask(Task):
     """Task whose reward and success follow from two rows of numbers, the desired and the achieved goal.
 
-    An algorithm may then ask for the reward of another goal than the one that was wanted, as hindsight experience
-    replay does. Success does not end an episode: a goal is to be kept.
+    An algorithm may compute the reward of another goal than the desired one, as hindsight experience replay does.
+    Success does not end an episode, since a goal is to be kept.
 
     A subclass declares `goal_entries`, and defines `desired` and `shortfall`.
 
@@ -64,7 +64,7 @@ class GoalTask(Task):
     def desired(self, worlds) -> np.ndarray:
         """Desired goals (n, numbers) before scaling, as `read` of `goal_entries` gives them.
 
-        They are told as those achieved are: over the scales, and clipped to the bounds.
+        Observations contain them like the achieved goals: divided by the scales, and clipped to the bounds.
         """
 
     @abstractmethod

@@ -212,9 +212,9 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
 def observe_reorient(taken, state, record, walls, actions, obs, outcome):
     """BlockReorient: observation, reward and success of some worlds; arguments as `observe_reach`.
 
-    The body axes are told as seen from the goal: first the outward normal of the target face, then the next
-    two body axes in cyclic order, with the half edges in the same order; the policy need not know which face
-    it is. obs is (worlds, 23) float32.
+    The body axes are given in the order of the goal: first the outward normal of the target face, then the next two
+    body axes in cyclic order, with the half edges in the same order. So the policy need not know which face it is. obs
+    is (worlds, 23) float32.
     """
     for i in range(taken[TAKEN_COUNT]):
         world = taken[TAKEN_FIRST_WORLD + i]

@@ -93,9 +93,9 @@ def rollout(
 ) -> TaskRollout:
     """Step every world of a task with its own sequence of actions, and keep the rewards.
 
-    The same bits as `Task.step` with one action after another. No episode starts anew: what a world does after the
-    end of its own is in the arrays too, and is left out of `TaskRollout.returns`. Afterwards the task is where the last
-    step left it.
+    A rollout has the same bits as `Task.step` with one action after another. No episode restarts. The arrays contain
+    the steps after the end of an episode, too, but `TaskRollout.returns` leaves them out. Afterwards the task is in the
+    state after the last step.
 
     Parameters
     ----------

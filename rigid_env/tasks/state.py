@@ -31,7 +31,8 @@ FILE = FileKind(
 class TaskState:
     """Copy of all that decides the future of a task's worlds, and the settings that must agree where it is restored.
 
-    Accuracy, `max_episode_steps` and distributions of draws may be others: the same worlds go on with those.
+    Accuracy, `max_episode_steps` and distributions of draws may differ: the same worlds then continue with the new
+    ones.
 
     Parameters
     ----------

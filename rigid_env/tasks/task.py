@@ -346,7 +346,7 @@ class Task(Starts):
     def own_settings(self) -> dict[str, Any]:
         """Settings of a kind of tasks that decide the future of episodes, by name; a state needs equal ones.
 
-        Scene, actions and time need not be among them.
+        They need not include scene, actions and time.
         """
         return {}
 

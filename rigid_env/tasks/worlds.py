@@ -22,8 +22,8 @@ def read_only(array: np.ndarray) -> np.ndarray:
 class Worlds:
     """Worlds of a task: all of them in a step, or those whose episodes begin.
 
-    Arrays are views of the running simulation where all worlds are meant: copy what is to be kept. What takes time to
-    work out is worked out when it is first read, once in a step.
+    Arrays for all worlds are views of the running simulation: copy them to keep them. Slow quantities are computed when
+    they are first read, once in a step.
 
     Attributes
     ----------

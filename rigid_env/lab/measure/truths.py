@@ -50,7 +50,7 @@ class Case:
     Attributes
     ----------
     key, what : str
-        Name for programs, and for people what the error is of.
+        Name for programs, and description of the error for people.
     unit : str
         Of the error.
     duration : float
@@ -62,7 +62,7 @@ class Case:
     goals : tuple of (error, microseconds)
         To be reached by one setting each: error, and wall-clock time per simulated second.
     scale : float, optional
-        Size of what happens, in `unit`: an error larger than half of it is no likeness any more. None: nothing happens.
+        Size of the motion, in `unit`; an error larger than half of it counts as lost. None: nothing moves.
     own_error : callable
         () -> error of the truth itself, in `unit`. Rounding of a closed form does not count.
     """

@@ -194,8 +194,8 @@ def fit(
 
     Other parameters are those of `nominal`.
 
-    Ctrl-C ends the search; the best so far is returned, marked as incomplete. Before the first evaluation has ended
-    there is nothing to return, and the interrupt goes on.
+    Ctrl-C ends the search; the best so far is returned, marked as incomplete. Before the end of the first evaluation
+    there is no result, and the interrupt is raised.
     """
     search = _Search(objective, check_names(names), tick, nominal)
     is_complete = True

@@ -131,7 +131,7 @@ class Report:
 def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -> list[Setup]:
     """List the fits: the headline, its two variants and the steps towards it; or `names`, fitted like the headline.
 
-    Second is the contact with the centre of mass where the free flights show it: not fitted to any error.
+    The second fit uses the centre of mass from the free flights, which is not fitted to any error.
     """
     if names is not None:
         return [Setup(", ".join(check_names(names)), tuple(names), Recording())]
@@ -178,7 +178,8 @@ class Measurement:
     def run(self, tick: Callable[[str, int], None] = lambda what, done: None) -> Report:
         """Fit each setup, then measure ladder and limits; ``tick`` gets the finished part and a number of evaluations.
 
-        After Ctrl-C no other setup is fitted, and the ladder is the accuracy of the fit alone: it ends soon.
+        After Ctrl-C no other setup is fitted, and the ladder has only the accuracy of the fit, so that the run ends
+        soon.
         """
         for setup in self.setups:
             case = self._case(setup, lambda best, what=setup.name: tick(f"{what}: {best:.4f}", 1))

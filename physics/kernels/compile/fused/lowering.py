@@ -2,7 +2,7 @@
 
 Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released or kept where a release
 would find it. Numba's lowering reads what a variable held before each assignment, and reads and clears it at the end of
-its life; what was an array has seven words to read and to clear. A third of all instructions said nothing else.
+its life; what was an array has seven words to read and to clear. A third of all instructions did only this.
 
 In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
 passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.
