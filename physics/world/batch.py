@@ -152,7 +152,7 @@ class Batch:
         return np.zeros((self.worlds, self.body_count, 6))
 
     def kept(self) -> tuple[np.ndarray, ...]:
-        """Arrays that a snapshot copies, not copied, in the order of `KEPT`."""
+        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
         return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:
