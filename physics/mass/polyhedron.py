@@ -80,7 +80,7 @@ class Polyhedron:
 
     @property
     def triangles(self) -> np.ndarray:
-        """Triangles (t, 3) int64 of the faces, which fan out from their first corners, counter-clockwise."""
+        """(t, 3) int64: the faces cut into triangles that fan out from their first corners, counter-clockwise."""
         return np.array([(loop[0], *pair) for loop in self.loops for pair in pairwise(loop[1:])])
 
     def inertia(self, mass: float) -> np.ndarray:

@@ -147,7 +147,7 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
 
 
 def make_rows(scene, accuracy, seen, refined) -> tuple[Row, ...]:
-    """All rows of a plan; `seen` holds the findings of `physics.plan.plan.make_plan` about the scene."""
+    """All rows of a plan; `seen` holds what `physics.plan.plan.make_plan` found out of the scene."""
     contact, friction, touching, rubbing = seen.contact, seen.friction, seen.touching, seen.rubbing
     return (
         _gravity_row(seen.gravity),

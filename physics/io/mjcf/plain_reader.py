@@ -165,7 +165,7 @@ def _wall(plane: Element) -> HalfSpace:
 
 
 def _unit(element: Element, key: str = "quat") -> np.ndarray:
-    """Normalised quaternion of an element, of any norm but zero, as in MuJoCo."""
+    """The quaternion of an element, normalised: as in MuJoCo it may have any norm but zero."""
     return _normalised(element, _numbers(element, "quat", 4, "1 0 0 0"))
 
 

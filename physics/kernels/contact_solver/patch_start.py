@@ -30,7 +30,7 @@ def warm_start_motion(n, patch, on, body, work):
 
 @inlined
 def warm_start_friction(n, patch, on, work):
-    """Tangential per normal impulse (two lanes) of the impulses in `work`; 0 for a contact that does not push."""
+    """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
     p = on * gather_component(work.impulse, 0, n)
     s = select_lanes(p > 0.0, 1.0 / p, 0.0)
     return s * gather_component(work.impulse, 1, n), s * gather_component(work.impulse, 2, n) / friction_ratio(work)

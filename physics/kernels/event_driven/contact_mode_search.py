@@ -40,7 +40,7 @@ _SAME_DIRECTION = 1.0e-9
 
 @kernel
 def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
-    """Most needed change of a trial: (candidate, its new kind), -1 when all conditions hold.
+    """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
 
     `rates` are the attitude, the angular velocity, and both accelerations of the trial.
     """

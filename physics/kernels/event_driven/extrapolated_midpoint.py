@@ -268,7 +268,7 @@ def _set_slip_turn_rate(offset_frame, work, motion):
 
 @inlined
 def _limit_to_slip_stop(h, P, w, work, motion):
-    """Shorten h to the time at which the first contact would stop sliding, or has turned, at the initial rates.
+    """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
 
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
     step much longer than that is of any high order.

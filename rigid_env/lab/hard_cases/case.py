@@ -139,7 +139,7 @@ class Setting:
 
     @property
     def meets_an_error(self) -> bool:
-        """True if error control steps bodies that touch each other; this is slow, so quick runs are smaller."""
+        """True if bodies that touch each other are stepped to an error: it is dear, so quick runs are smaller."""
         return self.is_event_driven
 
     @property

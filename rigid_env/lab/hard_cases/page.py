@@ -1,4 +1,4 @@
-"""Write the page `docs/hard-cases.md` and its picture from the outcomes of a run."""
+"""The page `docs/hard-cases.md`, written from what came out, and its picture."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ rigid-env hard-cases --steps 1e-3,1e-2,5e-2 --peers # where each holds; and othe
 
 
 def write_page(path: Path, report: Report, picture: Path | None, command: str) -> None:
-    """Write the page; `picture` is the path of the picture, `command` the typed command."""
+    """Write the page; `picture` is where `write_picture` put one, `command` what was typed."""
     plan, machine = report.plan, describe()
     git = machine["git"] or {}
     state = f"commit {git.get('commit', 'unknown')[:7]}{', with changes' if git.get('is_dirty') else ''}"
@@ -59,7 +59,7 @@ def _picture(path: Path, picture: Path | None) -> str:
 
 
 def _reasons(outcomes: Sequence[Outcome]) -> list[str]:
-    """Known reasons of the cases that fail."""
+    """Why those that fail do, as far as it is known."""
     lines = []
     for one in outcomes:
         if one.status is Status.FAILS:
@@ -70,7 +70,7 @@ def _reasons(outcomes: Sequence[Outcome]) -> list[str]:
 
 
 def _beside(report: Report) -> list[str]:
-    """Table with a column per engine: whether each case holds, and at which setting."""
+    """A column per engine: whether the case holds, and at which of its settings."""
     first = report.plan.accuracies[0]
     ours = {one.case.number: one for one in report.details if one.accuracy == first}
     engines = list(dict.fromkeys(one.engine for one in report.peers))
@@ -99,7 +99,7 @@ def _cell(outcome: Outcome | None) -> str:
 
 
 def write_picture(path: Path, report: Report) -> None:
-    """Draw a square per case and setting, with the margin as colour and failures in red.
+    """A square per case and setting: margin in colour, failures in red.
 
     Raises
     ------

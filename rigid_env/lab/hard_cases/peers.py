@@ -1,4 +1,4 @@
-"""Hard cases in other engines, through a class with the interface of `physics.World`."""
+"""Hard cases in other engines: a peer's run that looks like a `physics.World`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigid_env.lab.measure.peers import ENGINES, Engine, Unsupported, is_install
 
 
 class PeerWorld:
-    """A scene in a peer, with state, time and `step` of a `physics.World` of one world, and nothing else."""
+    """A scene in a peer: state, time and `step` of a `physics.World` of one world, nothing else of it."""
 
     def __init__(self, engine: Engine, scene: physics.Scene, dt: float, options: dict):
         try:
@@ -29,7 +29,7 @@ class PeerWorld:
         self.pos, self.quat, self.linvel, self.angvel = (np.asarray(part)[None] for part in self._run.state())
 
     def step(self, wrench=None, steps: int = 1) -> None:
-        """Advance by `steps`; a peer accepts no wrench."""
+        """Advance by `steps`; a wrench cannot be handed on."""
         if wrench is not None:
             raise UnsupportedError("a wrench is not handed to this engine")
         self._run.advance(steps)
@@ -44,7 +44,7 @@ def load_engines() -> tuple[dict[str, Engine], list[str]]:
 
 
 def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
-    """Outcome of a case at the first setting of a peer at which it holds, else at its defaults."""
+    """The outcome of a case at a peer's first setting with which it holds, else at its defaults."""
     outcomes = []
     for index in range(_setting_count(engine)):
         used: list[str] = []
@@ -63,7 +63,7 @@ def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
 
 
 def _setting_count(engine: Engine) -> int:
-    """Largest number of settings of the engine for a scene with contact."""
+    """Settings that the engine has for a scene with contact, the kind with most."""
     body = physics.Sphere(1.0, 1.0, pos=(0, 2, 0))
     touching = [physics.Contact(0.5), physics.Friction(0.5), physics.Gravity()]
     return len(engine.settings(physics.Scene([body], [physics.HalfSpace((0, 1, 0))], touching)))
@@ -72,7 +72,7 @@ def _setting_count(engine: Engine) -> int:
 def run_peers(
     cases: Sequence[Case], engines: Sequence[Engine], setting: Setting, tick: Callable[[str], None]
 ) -> Iterator[Outcome]:
-    """Outcomes of all cases that need the state only, case by case; Ctrl-C ends the run, not the program."""
+    """Outcomes of all cases that look at nothing but the state, case by case; Ctrl-C ends it, not the program."""
     try:
         for case in cases:
             for engine in engines:

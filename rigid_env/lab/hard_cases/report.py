@@ -1,4 +1,4 @@
-"""Command `rigid-env hard-cases`: run the cases, print and keep their outcomes."""
+"""The command `rigid-env hard-cases`: run, show, and keep what came out."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Plan:
 
     @property
     def settings(self) -> list[Setting]:
-        """All settings: every accuracy at every step, `dt` included."""
+        """Every accuracy at every step, `dt` among them."""
         steps = sorted({self.dt, *self.steps})
         return [Setting(name, dt, self.is_thorough) for name in self.accuracies for dt in steps]
 
@@ -53,7 +53,7 @@ class Plan:
 def make_plan(
     cases: tuple[Case, ...], accuracy: str, dt: float, steps: str, is_thorough: bool, has_peers: bool
 ) -> Plan:
-    """Make the plan of a run from a user's text: names and numbers with commas between them.
+    """From what a user types: names and numbers with commas between them.
 
     Raises
     ------
@@ -95,16 +95,16 @@ class Report:
 
     @property
     def details(self) -> list[Outcome]:
-        """Outcomes of our engine at the step whose details are shown."""
+        """Ours at the step at which details are shown."""
         return [one for one in self.outcomes if one.dt == self.plan.dt]
 
     @property
     def has_failed(self) -> bool:
-        """True if a case of ours fails at that step; other steps show the range in which it holds."""
+        """True if a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
         return any(one.status is Status.FAILS for one in self.details)
 
     def to_dict(self) -> dict:
-        """Report ready for JSON."""
+        """JSON-able."""
         plan = self.plan
         settings = {"accuracies": plan.accuracies, "dt": plan.dt, "steps": plan.steps, "is_thorough": plan.is_thorough}
         rows = [one.to_dict() for one in (*self.outcomes, *self.peers)]
@@ -112,7 +112,7 @@ class Report:
 
 
 def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Report:
-    """Run all cases with a progress bar and print tables; `keep` gets all outcomes so far after each of ours.
+    """Run all of it with a progress bar; print tables; after every outcome of ours `keep` holds all so far.
 
     Other engines make the shorter runs: all their settings are tried.
     """
@@ -161,7 +161,7 @@ def _print(console: Console, report: Report) -> None:
 
 
 def _beside(report: Report) -> Sequence[Outcome]:
-    """Outcomes of our engine at the first accuracy beside the peers', case by case."""
+    """Ours at the first accuracy and theirs, case by case; the engine stands for the name of the case."""
     first = report.plan.accuracies[0]
     ours = [one for one in report.details if one.accuracy == first and one.case.peers]
     rows = sorted([*ours, *report.peers], key=lambda one: (one.case.number, one.engine != OURS))

@@ -1,4 +1,4 @@
-"""Run hard cases at settings, one after the other; an interruption loses no finished outcome."""
+"""Run hard cases at settings, one after the other; what is done is never lost."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Outcome:
         return min(self.checks, key=lambda check: check.margin, default=None)
 
     def to_dict(self) -> dict:
-        """Outcome ready for JSON: numbers that are not finite become null."""
+        """JSON-able: numbers that are not finite become null."""
         return {
             "number": self.case.number, "name": self.case.name, "engine": self.engine, "accuracy": self.accuracy,
             "dt": self.dt, "status": self.status.value, "reason": self.reason, "seconds": self.seconds,
@@ -73,7 +73,7 @@ def _check_to_dict(check: Check) -> dict:
 
 
 def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | None = None) -> Outcome:
-    """Run one case at one setting; an exception inside the case becomes an outcome.
+    """Run one case at one setting. Whatever goes wrong inside it is an outcome, not an exception.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
 def run_all(
     cases: Sequence[Case], settings: Sequence[Setting], tick: Callable[[str], None] = lambda what: None
 ) -> Iterator[Outcome]:
-    """Outcomes of our engine, each once its case has run; Ctrl-C ends the run, not the program."""
+    """Outcomes of our engine, case by case, each as soon as it is there; Ctrl-C ends it, not the program."""
     try:
         for case in cases:
             for setting in settings:

@@ -18,7 +18,7 @@ LEGEND = "✓ holds   ✗ fails   - not supported   · not built"
 
 
 def came_out(outcome: Outcome) -> str:
-    """Describe the check with the least margin, or the reason why there is none."""
+    """Describe the check with the least margin; else the reason why there is none."""
     check = outcome.tightest
     if check is None:
         return outcome.reason
@@ -34,7 +34,7 @@ def _held(check: Check) -> str:
 
 
 def margin(outcome: Outcome) -> str:
-    """Unused share of the tightest limit, as text."""
+    """Share of the tightest limit that is left."""
     check = outcome.tightest
     if check is None:
         return "-"
@@ -44,7 +44,7 @@ def margin(outcome: Outcome) -> str:
 
 
 def detail_table(outcomes: Sequence[Outcome], title: str) -> Table:
-    """Table with a row per outcome: number, name, result, condition, margin, time, status."""
+    """Number, name, what came out, what must, margin, time, status; a row per outcome."""
     must = Column("what must", under="what came out, tightest check")
     columns = [
         Column("#", is_number=True), Column("case", is_whole=True), Column("what came out, tightest check"), must,
@@ -73,7 +73,7 @@ def grid_table(outcomes: Sequence[Outcome], title: str) -> Table:
 
 
 def _rows(outcomes: Sequence[Outcome]) -> list[list[Outcome]]:
-    """Outcomes by case, in the order of their first outcome."""
+    """Outcomes by case, in the order of the first of each."""
     rows: dict[int, list[Outcome]] = {}
     for one in outcomes:
         rows.setdefault(one.case.number, []).append(one)
@@ -81,7 +81,7 @@ def _rows(outcomes: Sequence[Outcome]) -> list[list[Outcome]]:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """Count outcomes by status: how many hold, fail, and so on."""
+    """Count those that hold, fail, and so on."""
     counts = {status: sum(one.status is status for one in outcomes) for status in Status}
     return ", ".join(f"{count} {status.value}" for status, count in counts.items() if count)
 
@@ -90,13 +90,13 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown of a table; bars in cells are escaped."""
+    """A table; bars in cells are escaped."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
 def markdown_detail(outcomes: Sequence[Outcome]) -> str:
-    """Markdown table of number, case, condition and result, margin, status."""
+    """Number, case, what must and what came out, margin, status."""
     rows = [
         (one.case.number, f"`{one.case.name}`: {one.case.title}", one.case.must, came_out(one), margin(one),
          f"**{one.status.value}**" if one.status is Status.FAILS else one.status.value)
@@ -106,7 +106,7 @@ def markdown_detail(outcomes: Sequence[Outcome]) -> str:
 
 
 def markdown_grid(outcomes: Sequence[Outcome]) -> str:
-    """Markdown table with a row per case and a column per accuracy and step."""
+    """A row per case, a column per accuracy and step."""
     columns = list(dict.fromkeys((one.accuracy, one.dt) for one in outcomes))
     rows = []
     for row in _rows(outcomes):

@@ -1,4 +1,4 @@
-"""Measurements of speed and accuracy, shared by `rigid-env bench`, `rigid-env accuracy` and `benchmarks/`.
+"""Measuring speed and accuracy: what `rigid-env bench`, `rigid-env accuracy` and `benchmarks/` share.
 
 `timing` has the arithmetic (repeats, medians, ratios), `machine` says where a number was measured,
 `workloads` is the work our engine is given, `mujoco_scene` the same work for MuJoCo, `rows` pairs the two,

@@ -125,7 +125,7 @@ def bytes_per_body(world: physics.World) -> int:
 
 
 def chosen(names: Sequence[str], page: Path | None) -> list[str]:
-    """Effects of these names, or all without names.
+    """The effects to measure: those of the names, all where there are none.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callabl
 
 
 def markdown(rows: list[Row]) -> str:
-    """Rows as a table in Markdown: time and memory that an effect adds."""
+    """The rows as a table of a page: what an effect adds to a step, in time and in memory."""
     lines = [
         "| effect | its scene without it [ns a step] | adds [ns] | stores [bytes a body] |",
         "| --- | --- | --- | --- |",

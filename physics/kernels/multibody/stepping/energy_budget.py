@@ -137,7 +137,7 @@ def free_lift_work(b, many):
 
 @kernel
 def clamp_body_inside_walls(b, offset_frame, many):
-    """Move a body whose centre is behind a wall inside, without that velocity; return whether it was behind.
+    """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
 
     Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,
     and its points then say nothing about the way of the centre.

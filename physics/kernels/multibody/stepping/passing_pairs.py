@@ -67,7 +67,7 @@ def _smallest_half_width(b, many):
 
 @kernel
 def _thinning(a, b, n, h, many):
-    """Thinning of bodies a and b [m]: the slop, plus the depth to which they land in others within h."""
+    """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h."""
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
         c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
