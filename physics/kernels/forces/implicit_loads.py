@@ -107,9 +107,9 @@ def point_mobility(direction, arm, R, mass, J):
 def implicit_point_force(w, n, s, t, wn, ws, wt, along, across):
     """Force f = (1 + Z W)⁻¹ Z w for the acceleration w of a point, or of two against each other.
 
-    Z has `along` the unit vector n and `across` it, along s and t [kg]; wn, ws, wt are W n, W s and W t, with the
-    mobility W of the point or of both [1/kg]. In these axes row i reads f_i + z_i (W f)_i = z_i w_i; divided by
-    1 + z_i W_ii it is as good for any z.
+    Z has the stiffness `along` on the unit vector n, and `across` on s and t [kg]. wn, ws, wt are W n, W s and W t,
+    with the mobility W of the point or of both [1/kg]. In these axes row i reads f_i + z_i (W f)_i = z_i w_i. Each row
+    is divided by 1 + z_i W_ii, which keeps the system accurate for any z.
     """
     kn = along / (1.0 + along * qt.dot(n, wn))
     ks = across / (1.0 + across * qt.dot(s, ws))
