@@ -1,7 +1,7 @@
 """A file of one world's steps, and its bit-for-bit replay.
 
-A world's future is decided by its `Snapshot`, the wrenches and the lengths of its steps: a recording holds these, the
-scene as text, and the state after every step, so that a replay can tell whether it came out the same.
+The future of a world follows from its `Snapshot`, and from the wrenches and lengths of its steps. A recording holds
+these, the scene as text, and the state after every step, with which a replay is compared.
 """
 
 from __future__ import annotations

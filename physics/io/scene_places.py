@@ -1,7 +1,8 @@
 """Lines of tables and keys in the text of a scene file.
 
-The reader of TOML gives values without places. They are found again in the text: a table [[bodies]] by its header, a
-key below it, before the next header. Of tables written inline, ``bodies = [{...}]``, the line of the list is told.
+The reader of TOML gives values without places, so these are searched in the text. A table [[bodies]] is found by its
+header, a key below it, before the next header. Errors in inline tables, ``bodies = [{...}]``, name the line of the
+list.
 """
 
 from __future__ import annotations

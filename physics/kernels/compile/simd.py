@@ -1,10 +1,9 @@
 """Four numbers at once: an operation acts on each, in one instruction if the processor has one for it.
 
-A block rests on a wall with three or four vertices, and all of them are asked the same: how fast they slide, in what
-direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`fused.simd_types`) or four numbers
-(`public.simd_types`). This module says what it means, and is what it is without a compiler. A number beside lanes is
-four of it. No result depends on the processor: each lane is what the number alone would be, and sums are taken in one
-order (`lane_sum`).
+A block rests on a wall with three or four vertices, which all need the same quantities: slip speed, direction, push. In
+kernels `Lanes` is a vector of LLVM (`fused.simd_types`) or four numbers (`public.simd_types`). This module defines it,
+and implements it without a compiler. A number beside lanes counts as four equal ones. No result depends on the
+processor: each lane has the result of a plain number, and sums are taken in one order (`lane_sum`).
 """
 
 from __future__ import annotations

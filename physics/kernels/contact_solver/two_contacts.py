@@ -4,9 +4,9 @@ Two contacts that slide are two angles. For given directions "both normal veloci
 2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
 across them (`one_contact` has the same for a single contact).
 
-A direction that would have to turn right round belongs to a contact that holds. Its impulse answers the other's,
-p_i = -W_ii⁻¹ (b_i + W_ij p_j), so that the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij.
-Where the cone does not allow p_i, contact i slides against it, and that is the next direction to start from.
+A direction that would turn right round belongs to a contact that sticks. Its impulse answers the other's, p_i = -W_ii⁻¹
+(b_i + W_ij p_j). So the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij. If the cone does not
+allow p_i, contact i slides against it, which gives the next direction to start from.
 """
 
 from __future__ import annotations

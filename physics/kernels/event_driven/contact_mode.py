@@ -4,11 +4,11 @@
     or starts to slide (f_t = -μ f_n a_t/|a_t|); one that has slides on (f_t = -μ f_n u_t/|u_t|)
 
 When no contact slides, these are the conditions of an impact with accelerations in place of velocities, and the same
-solver gives them: exact cones, pivoting behind it. When some slide, contacts change between open, held and sliding
-until all conditions hold; each trial is one linear system (`contact_forces`). Where that goes round in circles the
-solver is asked again, with a large tangential acceleration in place of each contact's sliding. If it can only stop the
-sliding (Painlevé's paradox: a sliding contact may have no force) the velocities have to jump: `step` makes an impulse
-of it.
+solver gives them: exact cones, with pivoting as the fallback. When some slide, contacts change between open, sticking
+and sliding until all conditions hold; each trial is one linear system (`contact_forces`). If the search goes round in
+circles, the solver is called again, with a large tangential acceleration in place of each contact's sliding. If it can
+only stop the sliding (Painlevé's paradox: a sliding contact may have no force), the velocities have to jump, and `step`
+applies an impulse.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Forces that dip below their bounds and come back within one smooth step, unseen at its ends.
 
-As for gaps, the cubic through the margins at both ends and their rates shows it. The rates are differences along the
-motion. Where the cubic comes close to zero the step is made up to its lowest point only, and looked at there.
+The cubic through the margins and their rates at both ends shows such dips, as for gaps. The rates are differences along
+the motion. Where the cubic comes close to zero, the step is made up to its lowest point only, and the margin is tested
+there.
 """
 
 from __future__ import annotations

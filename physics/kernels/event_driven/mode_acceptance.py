@@ -1,9 +1,10 @@
 """Judge steps of a contact mode with unreliable force guards, by a search for the contact mode after each.
 
-Where contacts are more than the body's motion needs, their forces can be shared out in many ways, of which the linear
-system takes one. That one may leave a cone, or pull, where others hold: the guard ends the mode and the search finds
-the same one again. Then these guards are not heeded for it. After every step the mode is looked for, and the step is
-taken back and made shorter when the acceleration has jumped in it: then another contact mode had begun before its end.
+Where there are more contacts than the body's motion needs, their forces can be distributed in many ways. The linear
+system takes one of them, which may leave a cone, or pull, where others do not. The guard then ends the mode, and the
+search finds the same mode again. In this case force guards are ignored. The mode is searched after every step instead.
+If the acceleration has jumped within the step, another contact mode had begun before its end, and the step is taken
+back and shortened.
 """
 
 from __future__ import annotations

@@ -1,14 +1,15 @@
 """Direction in which a contact begins to slide, at a speed too small to define it.
 
-Friction that is used up lets go without a jump: the acceleration grows from zero, and the slip |u| with the square of
-the time. Its direction follows what acts at the rate K/|u|, K the acceleration that friction gives across it for each
-radian: stiff beyond all bounds. But it is known without: with φ the angle of u and a(φ) the acceleration under the
-friction opposed to it,
+A contact at the limit of friction begins to slide without a jump: the acceleration grows from zero, and the slip |u|
+with the square of the time. Its direction follows the loads at the rate K/|u|, where K is the acceleration that
+friction gives across it for each radian. This is stiff beyond all bounds. But the direction is known without the speed.
+With φ the angle of u and a(φ) the acceleration under the friction opposed to it,
 
     a(φ)·d⊥ = |u| φ'.
 
-Without the right-hand side that is the direction which nothing turns. With it, φ' the rate at which that one turns, and
-over 1 + |u|'/K since φ lags behind it by |u| φ'/K, which grows, what is left out is of the order (|u|'/K)² of it.
+Without the right-hand side this gives the direction that nothing turns; let φ' be the rate at which that one turns. The
+right-hand side is divided by 1 + |u|'/K, since φ lags behind by |u| φ'/K, which grows. The relative error is of the
+order (|u|'/K)².
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Buoyancy in a fluid at rest below a plane: F = ρ g V n at the centre of the submerged part.
 
-Its energy is ρ g V times the depth of that centre: lifting the body lets the fluid fill what it leaves.
+Its energy is ρ g V times the depth of that centre, since a lifted body leaves its place to the fluid.
 
 References
 ----------

@@ -5,11 +5,11 @@ Rolling and spin friction are torques. With the normal impulse p of a contact, �
     across the normal   |T| <= a p,    T against ω - (n·ω) n   (rolling)
     along the normal    |T| <= b p,    T against (n·ω) n       (spin)
 
-each as large as it may be while there is turning for it to oppose, and no larger than stops it. The stage knows p only
-when its contacts are solved, and friction answers to the torque: a ball that rolls is slowed by it as a whole, one
-that slides is not. So the stage is solved again with the whole torque among the loads of the body, and where that
-would turn the body round, with the share of it that leaves no turning (it is found by false position: between the
-changes from sticking to sliding the contact problem is linear).
+Each is as large as allowed while there is a rotation to oppose, and at most as large as stops it. The stage knows p
+only when its contacts are solved, and friction answers to the torque: it slows a rolling ball as a whole, but not a
+sliding one. So the stage is solved again with the whole torque among the loads of the body. If that would reverse the
+rotation, the share of the torque that leaves none is used. False position finds it, since between the changes from
+sticking to sliding the contact problem is linear.
 
 References
 ----------

@@ -1,8 +1,8 @@
 """Pass arguments of many words between kernels by address.
 
-The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba hands each word on as an argument of
-its own: of all instructions written for a step of bodies four in five took that tuple apart or put it together. Here a
-call hands on one address, and a kernel reads from there what it reads of the tuple.
+The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba passes each word as an argument of
+its own. Four in five of all instructions written for a step of bodies took that tuple apart or put it together. Here a
+call passes one address, from which a kernel reads the members that it needs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Elements of arrays, and arrays of records, in as few instructions as possible.
 
-Numba lowers them by way of memory: to read `a[i, j]` it writes the array's seven words into a place of its own, reads
-shapes and strides from there, and multiplies those of an array whose size is known. The optimiser leaves nothing of it;
-here it is not written in the first place. All other cases are left to Numba.
+Numba lowers elements through memory. To read `a[i, j]` it copies the array's seven words, reads shapes and strides from
+the copy, and multiplies these even for an array of known size. The optimiser removes all of it; here it is not written
+in the first place. All other cases are left to Numba.
 """
 
 from __future__ import annotations

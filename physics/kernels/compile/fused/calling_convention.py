@@ -1,8 +1,8 @@
 """Calling convention between kernels: arguments by value, and a return value in place of a status.
 
-A function that Numba compiles writes its result where its caller tells it, and returns a status; its caller reads the
-status, hands an exception on, and reads the result. Kernels raise none; only functions of users may. Here a part
-returns its value; one that may raise is lowered again as Numba does it, and so are those that call it, so that the
+A function compiled by Numba writes its result to a place of its caller, and returns a status. The caller reads the
+status, passes an exception on, and reads the result. Kernels raise no exceptions; only functions of users may. Here a
+part returns its value. A part that may raise is lowered again in Numba's way, and so are its callers, so that the
 exception gets through.
 """
 

@@ -1,6 +1,6 @@
 """Code libraries of kernels: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
 
-What is not public of Numba here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
+The private part of Numba used here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Machine code of wholes and shared kernels on disk (`dispatcher`).
 
-What is kept of either names the kernels that it calls and that stand: they are loaded before it.
+A file names the shared kernels that its code calls; they are loaded before it.
 """
 
 from __future__ import annotations

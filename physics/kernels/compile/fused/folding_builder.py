@@ -1,7 +1,8 @@
 """Builder of a kernel's instructions that folds those with known results.
 
-Numba hands structures about (an array is one of seven words): puts a word in, takes another out, and leaves it to LLVM
-to see that nothing happened. Writing that down, reading it and seeing it was most of the time a kernel took.
+Numba passes structures on (an array is one of seven words). It inserts a word, extracts another, and leaves it to LLVM
+to find out that nothing happened. Writing, reading and removing such instructions was most of the compile time of a
+kernel.
 """
 
 from __future__ import annotations

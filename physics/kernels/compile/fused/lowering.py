@@ -1,8 +1,8 @@
 """Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
 
-Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released or kept where a release
-would find it. Numba's lowering reads what a variable held before each assignment, and reads and clears it at the end of
-its life; what was an array has seven words to read and to clear. A third of all instructions did only this.
+Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released, or kept for a release.
+Numba's lowering reads the old value of a variable before each assignment, and reads and clears it at the end of its
+life; an array has seven words to read and to clear. A third of all instructions did only this.
 
 In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
 passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.

@@ -1,7 +1,7 @@
 """Table of operations that replaces Numba's: types of results, and lowerings.
 
-Numba has a dozen templates for `a[i]` and asks each, and for what follows it writes many times what is needed. Each
-module here knows some operations; of all others Numba is asked.
+Numba tries a dozen templates for `a[i]`, and then writes many times the necessary code. Each module here knows some
+operations; all others are left to Numba.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Examine a user's function in the form that Numba makes of it: its result, and all that it reads.
 
-A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it is
-called with later, so that nothing is compiled twice; its code is then looked through.
+A kernel has no exceptions and no checks of bounds; a user's function may have both. So it is first compiled alone, for
+the types of its later calls, so that nothing is compiled twice. Then its code is examined.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Functions with the arithmetic of machine code: infinity or NaN where Python raises an exception.
 
-A quotient, a power and a function of `math` of a kernel are calls of functions here. A function is parsed and written
-anew for that, line by line where it stands, so that a debugger stops at the statements of its file.
+Quotients, powers and functions of `math` in a kernel become calls of functions here. The source of the kernel is parsed
+and rewritten for that, each line in its place, so that a debugger stops at the statements of its file.
 """
 
 from __future__ import annotations
