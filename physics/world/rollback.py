@@ -9,9 +9,9 @@ from physics.world.batch import Batch
 
 
 class Before:
-    """Copy of a world's whole state before a step that may raise an exception (`Plan.may_raise`).
+    """All that decides how a world goes on, copied before a step that may end in an exception (`Plan.may_raise`).
 
-    When an exception is raised, the kernel has advanced some worlds of the batch, but not all.
+    By then the kernel has advanced some worlds of the batch, and not the others.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Before:
         self._actuation = None if world.actuation is None else world.actuation.kept()
 
     def put_back(self, error: Exception) -> NoReturn:
-        """Restore the world and raise the exception; an IndexError then names the field's class."""
+        """Put the world back as it was and raise the exception; that of an index then names the field's class."""
         world = self._world
         for array, before in zip(world.kept(), self._kept, strict=True):
             array[...] = before

@@ -307,7 +307,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         return [(generator, generator.bit_generator.state) for generator in ended]
 
     def _kept_pictures(self) -> dict[str, np.ndarray]:
-        """Copies of the source's memory, taken where a user's code may raise an error."""
+        """Copies of the source's memory, where code of a user may end with an error."""
         return {name: array.copy() for name, array in self._source.arrays.items()} if self.task.may_fail else {}
 
     def _put_pictures(self, kept: dict[str, np.ndarray]) -> None:

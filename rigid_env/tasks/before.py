@@ -25,7 +25,7 @@ class Before:
         self._generators: dict[int, dict] = {}
 
     def keep(self) -> None:
-        """Copy all that the coming step changes."""
+        """Copy what the coming step changes."""
         task = self._task
         for array, kept in self._kept:
             kept[...] = array
