@@ -273,7 +273,7 @@ def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sou
 
 
 def _hold(task, state: TaskState, chosen: np.ndarray, sources: np.ndarray, is_all: bool) -> None:
-    """Hold the values that the state holds."""
+    """Give the task the held values of the state."""
     held = task.episodes.held
     for name, values in state.held.items():
         held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]

@@ -226,7 +226,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     mu : (n or more,) float64
         Coefficients of friction, >= 0.
     n : int
-        How many contacts.
+        Number of contacts.
     p : (3 n or more,) float64, in and out
         [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
         the solution if the status is `LCP_SOLVED`, else unchanged.
@@ -281,7 +281,7 @@ def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
     b : (n or more,) float64
         [m/s]. Free normal velocities, bias included.
     n : int
-        How many contacts.
+        Number of contacts.
     p : (n or more,) float64, out
         [N s]. The solution if the status is `LCP_SOLVED`, else unchanged.
     work, index : float64, int64, work

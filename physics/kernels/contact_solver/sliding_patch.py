@@ -112,7 +112,7 @@ class PushingContacts(NamedTuple):
     Attributes
     ----------
     count : int
-        How many.
+        Number of them.
     on : lanes
         1 for each of them, 0 for an open contact.
     is_back : lanes

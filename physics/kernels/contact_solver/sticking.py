@@ -78,7 +78,7 @@ class BoltGroup(NamedTuple):
     Attributes
     ----------
     count : int
-        How many.
+        Number of them.
     center : tuple of 3 floats
         Their centroid r̄, from the centre of mass [m].
     second : tuple of 6 floats

@@ -113,7 +113,7 @@ def body_rows(is_quick: bool, repeats: int, with_peer: bool, tick: Tick | None =
     with_peer : bool
         Whether MuJoCo is measured too.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for key, case in cases(is_quick).items():
         runners = {accuracy: Ours(case, accuracy) for accuracy in ACCURACIES}

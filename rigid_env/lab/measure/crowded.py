@@ -82,7 +82,7 @@ def crowded_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None 
     with_peer : bool
         Whether the same ratio of MuJoCo's rollout is noted.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     longer = replace(sizes, batch_steps=LONGER * sizes.batch_steps)
     runners = {name: workloads.Batch(ACCURACY, replace(longer, threads=k)) for k, name in ((1, ONE), (2, TWO))}

@@ -108,7 +108,7 @@ def environment_rows(
         Of every contestant, in turns.
     peer : EnvPeer, optional
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for threads in THREADS:
         yield _vector_rows(threads, sizes, repeats, peer, tick)

@@ -35,7 +35,7 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
     with_peer : bool
         Whether MuJoCo is measured too.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for key in SINGLE:
         yield _single_rows(key, sizes, repeats, with_peer, tick)
