@@ -37,19 +37,19 @@ def cells(row: Row) -> tuple[Text, ...]:
 
 
 def number(value: float) -> str:
-    """Number with three digits, and k or M for large ones."""
+    """Three digits, with k and M for large numbers."""
     return number_range(value, value)
 
 
 def number_range(lowest: float, highest: float) -> str:
-    """Two numbers as a range, or one if they are equal; a common letter stands once, behind the second."""
+    """Both numbers as `number` has them, or one if they are the same; a letter stands once, behind the second."""
     size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
     ends = dict.fromkeys(f"{value / size:.3g}" for value in (lowest, highest))
     return "..".join(ends) + letter
 
 
 def two_lines(spread: Spread) -> Text:
-    """Two lines: the median, and below it the lowest and highest sample."""
+    """The median, and below it lowest and highest sample."""
     if len(spread.samples) == 1:
         return Text(number(spread.median))
     return _over(number(spread.median), number_range(spread.lowest, spread.highest))

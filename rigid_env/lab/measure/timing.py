@@ -110,7 +110,7 @@ class Row:
 def interleave(
     contestants: dict[str, Callable[[], float]], repeats: int, tick: Callable[[str], None] | None = None
 ) -> dict[str, Spread]:
-    """Measure contestants in turns, A B A B ..., so that disturbances of the machine affect all alike.
+    """Measure contestants in turns, A B A B ..., so that what disturbs the machine disturbs them alike.
 
     Parameters
     ----------
