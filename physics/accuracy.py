@@ -1,4 +1,4 @@
-"""Accuracy of a simulation: presets and their knobs."""
+"""Accuracy of a simulation: presets and their settings."""
 
 from __future__ import annotations
 
@@ -29,56 +29,57 @@ COLLISIONS = ("simultaneous", "sequential")
 @known_keywords
 @dataclass(frozen=True)
 class Accuracy:
-    """Every knob of a simulation; `Accuracy()` is the preset ``balanced``.
+    """All settings of a simulation's accuracy; `Accuracy()` is the preset ``balanced``.
 
     Parameters
     ----------
     substeps : int
         Parts into which each `dt` is cut.
     scheme : str
-        ``events``: smooth motion to `tolerance` between events, each located to rounding (impacts, and where contacts
-        begin, end, stick and slip). Where bodies touch each other, or hulls or bodies tied together by springs touch
-        walls, it is time stepping with an error instead: a substep is cut into parts, each of which agrees with two of
-        half its length, to 100 tolerances of the body's size and speed; impacts are met in time, what else changes is
-        found by halving, down to 2**-24 of the substep (what that leaves is counted as `StepReport.fallbacks`).
-        Otherwise time stepping, and how free motion is integrated: ``exact`` (parabola
-        and free rotation to rounding; second order in an applied torque), or a textbook scheme to compare with:
-        ``explicit_euler``, ``semi_implicit_euler``, ``midpoint``, ``rk4``; while a body touches a wall Moreau's
-        midpoint step is used whichever it is.
+        ``events``: smooth motion to `tolerance` between events, each located to rounding. Events are impacts, and the
+        times at which contacts begin, end, stick and slip. Where bodies touch each other, or hulls or bodies tied
+        together by springs touch walls, it is time stepping with error control instead. A substep is cut into parts,
+        each of which agrees with two of half its length, to 100 tolerances of the body's size and speed. Impacts have
+        times of their own. Other changes are found by halving, down to 2**-24 of the substep; `StepReport.fallbacks`
+        counts those that are not.
+        All other schemes are time stepping, and name the integrator of free motion. ``exact``: parabola and free
+        rotation to rounding, second order in an applied torque. Textbook schemes, for comparison: ``explicit_euler``,
+        ``semi_implicit_euler``, ``midpoint``, ``rk4``. While a body touches a wall each of them takes Moreau's midpoint
+        step.
     solver : str
-        ``sweeps+pivoting``: contact problems of one wall are solved directly where they hold, slide or pivot, else by
-        sweeps over the exact friction cones and Newton's method, and by Lemke (Dantzig without friction) where those
-        leave a residual above 1 %. What stays above the tolerance is reported as unconverged.
-        ``sweeps``: without that last resort.
+        ``sweeps+pivoting``: contact problems of one wall are solved directly where contacts hold, slide or pivot.
+        Others are solved by sweeps over the exact friction cones and Newton's method. Where those leave a residual
+        above 1 %, Lemke's method takes over (Dantzig's without friction). A residual above the tolerance is reported as
+        unconverged. ``sweeps``: without Lemke's and Dantzig's methods.
     tolerance : float
-        Largest residual of a contact problem, relative to its largest free contact speed; with ``events`` also the
-        error of one smooth step, relative to the body's size and speed (where bodies touch each other a hundredth of
-        that of a part, and no less than 1e-11).
+        Largest residual of a contact problem, relative to its largest free contact speed. With ``events`` also the
+        error of one smooth step, relative to the body's size and speed. Where bodies touch each other it is a hundredth
+        of the error of a part, and at least 1e-11.
     iterations : int
-        Sweeps per contact problem at most (as many visits of contacts as there are contacts are one), and as many
-        iterations with a linear system, of bodies that touch each other. Where that system would take more time than
+        Largest number of sweeps per contact problem; one sweep is n contact updates for n contacts. It also limits the
+        iterations with a linear system, for bodies that touch each other. Where that system would take more time than
         ten times those sweeps (large piles at ``fast``, while they move) there are sweeps only.
     impacts : int
-        Impacts (with ``events`` all events) of one body that one substep resolves in time; more are reported and
-        treated as plastic (with ``events`` the rest of the substep is left out). Where bodies touch each other: of all
-        of them, in one substep or part.
+        Largest number of impacts of one body that one substep resolves in time. Further impacts are reported and
+        treated as plastic. With ``events`` it counts all events, and the rest of the substep is left out. Where bodies
+        touch each other it counts impacts of all of them, in one substep or part.
     slop : float
-        Gap within which a feature touches a wall, and (but with ``events``) error of the place of an impact, in
-        bounding radii. With ``events`` a rebound no higher than a few slops is not made; where bodies touch each other
-        it is no less than 1e-12 there.
+        Gap within which a feature touches a wall, in bounding radii. Without ``events`` it is also the error of the
+        place of an impact. With ``events`` a rebound up to a few slops high is not made; where bodies touch each other
+        the slop is at least 1e-12 there.
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.
     slip : str
-        What friction opposes in a step of time stepping in which one or two points of a body touch walls. ``mean``: the
-        mean of their slip before and after the step, of second order. ``end``: their slip after it, as for faces and
-        between bodies: quicker, and of first order where the direction of sliding turns.
+        Slip that friction opposes in a step of time stepping in which one or two points of a body touch walls.
+        ``mean``: the mean of the slips before and after the step, of second order. ``end``: the slip after it, as for
+        faces and between bodies. This is quicker, and of first order where the direction of sliding turns.
     collisions : str
-        What happens to contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
-        ``sequential``, with ``events`` or where bodies touch each other: one after the other, the one that approaches
-        fastest first (of equals the one of the lowest wall and vertex), until none approaches; where that has no end in
-        sight, the rest at once, reported (unconverged, or unresolved). Two laws, not two accuracies: where several
-        contacts collide they have other outcomes.
+        Law of contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
+        ``sequential``, with ``events`` or where bodies touch each other: one contact after the other, until none
+        approaches. The one that approaches fastest comes first; of equals the one of the lowest wall and vertex. Where
+        this has no end in sight the rest collides at once, and is reported (unconverged, or unresolved). These are two
+        laws, not two accuracies: their outcomes differ where several contacts collide.
 
     Raises
     ------
@@ -122,7 +123,7 @@ PRESETS: dict[Preset, Accuracy] = {
 
 
 def resolve(accuracy: Preset | Accuracy, field: str = "accuracy") -> Accuracy:
-    """The `Accuracy` of a preset's name, or the one given; `field` is what messages call it."""
+    """Return the `Accuracy` of a preset's name, or the one given; messages name it `field`."""
     if isinstance(accuracy, Accuracy):
         return accuracy
     known: Any = PRESETS

@@ -1,4 +1,4 @@
-"""Types that stand in public signatures: vectors as they are kept, choices by name, and functions as they are."""
+"""Types in public signatures: vectors, named choices, decorated functions."""
 
 from __future__ import annotations
 
@@ -6,33 +6,33 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 Vector = tuple[float, float, float]
-"""Three numbers, kept by a frozen description; any sequence or array of three is taken."""
+"""Type of three numbers of a frozen description, made from any sequence or array of three."""
 
 Quaternion = tuple[float, float, float, float]
-"""Four numbers (w, x, y, z), kept likewise."""
+"""Type of four numbers (w, x, y, z) of a frozen description."""
 
 Shape = Literal["block", "sphere", "ellipsoid", "hull"]
-"""Kind of a body."""
+"""Name of a kind of body."""
 
 Frame = Literal["world", "body"]
-"""Axes of a vector."""
+"""Name of the frame of a vector."""
 
 Layout = Literal["three", "corner"]
-"""Walls of a canonical scene."""
+"""Name of a layout of walls."""
 
 Preset = Literal["fast", "balanced", "precise", "reference"]
-"""Accuracy by name."""
+"""Name of an accuracy."""
 
 Scheme = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
-"""Integration scheme by name; see `physics.Accuracy`."""
+"""Name of an integration scheme; see `physics.Accuracy`."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-"""A function that a decorator returns with its signature."""
+"""Type variable of a function whose signature a decorator keeps."""
 
 if TYPE_CHECKING:
 
     class Effect:
-        """Effect of a scene, as checkers see it: a list of different ones is a list of these."""
+        """Base class of effects, so that checkers see a list of different ones as a list of effects."""
 
 else:
     Effect = object

@@ -1,4 +1,4 @@
-"""Short HTML tables of objects: what a notebook shows in the place of a `repr`.
+"""Short HTML tables of objects, which notebooks show instead of a `repr`.
 
 `table` makes the HTML, and nothing else does. A class takes part by one line, ``_repr_html_ = parts_table`` or
 ``_repr_html_ = fields_table``.
@@ -17,10 +17,10 @@ import numpy as np
 from physics.summary import LONGEST_VALUE, SCREEN, HasParts, shown
 
 LARGEST = 4096
-"""Size of a table at most [bytes of UTF-8]."""
+"""Largest size of a table [bytes of UTF-8]."""
 
 LONGEST_CELL = SCREEN // 2
-"""[characters]. Longer text is cut."""
+"""Largest length of a text [characters]; longer ones are cut."""
 
 _LEFT = 'style="text-align: left"'  # notebooks set cells to the right; colours are the notebook's own
 _END = "</tbody></table>"
@@ -58,30 +58,30 @@ def table(title: str, rows: Iterable[tuple[str, str]]) -> str:
 
 
 def parts_table(item: HasParts, *more: tuple[str, str]) -> str:
-    """Table of an object whose `repr` is made of parts: a part in each row, and more rows below."""
+    """Table of an object whose `repr` is made of parts: a row for each part, and further rows below."""
     return table(type(item).__name__, (*map(_split, item._parts()), *more))
 
 
 def fields_table(item: Any) -> str:
-    """Table of a dataclass, a field in each row."""
+    """Table of a dataclass with a row for each field."""
     values = ((field.name, getattr(item, field.name)) for field in fields(item) if field.repr)
     return table(type(item).__name__, ((name, _value(value)) for name, value in values))
 
 
 def _value(value: object) -> str:
-    """A value as in a `repr`, or shortened where that is long."""
+    """Value as in a `repr`, shortened if it is long."""
     text = shown(value) if isinstance(value, np.ndarray) else repr(value)
     return text if len(text) <= LONGEST_VALUE else shown(value)
 
 
 def _split(part: str) -> tuple[str, str]:
-    """Name and value of a part; no name where it has none."""
+    """Name and value of a part; no name if it has none."""
     found = _NAMED.fullmatch(part)
     return ("", part) if found is None else (found[1], found[2])
 
 
 def _cell(text: str) -> str:
-    """Text of a cell: cut, escaped, and without what a browser would not take (surrogates, control characters)."""
+    """Text of a cell: cut, escaped, and without characters that browsers refuse (surrogates, control characters)."""
     text = text if len(text) <= LONGEST_CELL else f"{text[: LONGEST_CELL - 4]} ..."
     text = "".join(char if char.isprintable() or char in "\n\t" else "\N{REPLACEMENT CHARACTER}" for char in text)
     return escape(text)

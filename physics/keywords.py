@@ -39,8 +39,8 @@ def no_attribute(module: str, name: str, allowed: Iterable[str]) -> AttributeErr
 def known_keywords(target: Function) -> Function:
     """Let a function, or a class when it is made, refuse unknown keywords with the list of those it knows.
 
-    A decorator; above `dataclass` where both are used. The signature stays, for editors, `help` and
-    `inspect.signature`. Nothing is looked up in a call but the names given; calls in a step do without it.
+    This decorator stands above `dataclass` if both are used. The signature stays, for editors, `help` and
+    `inspect.signature`. A call only looks up the given names; functions of a step do without the decorator.
 
     Parameters
     ----------

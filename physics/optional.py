@@ -1,4 +1,4 @@
-"""Packages that are imported only when a call needs them."""
+"""Packages imported only by the calls that need them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def missing(module: str, purpose: str) -> ModuleNotFoundError:
 
 
 def find_optional(module: str, least: tuple[int, ...] = ()) -> ModuleType | None:
-    """Module of an optional package, or None where the package is not installed or older than the version `least`."""
+    """Module of an optional package; None if the package is missing or older than the version `least`."""
     try:
         found = import_module(module)
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""Values on a line, objects on a screen: for messages and `repr`."""
+"""Short texts of values and objects, for messages and `repr`."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class _Short(reprlib.Repr):
         self.maxstring = self.maxother = LONGEST_VALUE
 
     def repr_int(self, x, level):
-        """Digits, or the number of bits of what Python would take long to print."""
+        """Digits, or the number of bits if Python would take long to print the digits."""
         return repr(x) if x.bit_length() <= MOST_BITS else f"an integer of {x.bit_length()} bits"
 
     def repr_float64(self, x, level):
@@ -42,7 +42,7 @@ class _Short(reprlib.Repr):
         return repr(float(x))
 
     def repr_ndarray(self, x, level):
-        """The numbers, or the shape of an array that has many."""
+        """Numbers of an array, or its shape if it has many."""
         if x.size > MOST_NUMBERS:
             return f"an array of shape {x.shape}"
         return repr(x.item()) if x.ndim == 0 else np.array2string(x, precision=6, separator=", ")
@@ -52,7 +52,7 @@ _SHORT = _Short()
 
 
 def shown(value: object, longest: int = LONGEST_VALUE) -> str:
-    """A value on one line of at most `longest` characters."""
+    """Value on one line of at most `longest` characters."""
     text = " ".join(_SHORT.repr(value).split())
     if len(text) <= longest:
         return text
@@ -61,7 +61,7 @@ def shown(value: object, longest: int = LONGEST_VALUE) -> str:
 
 
 def fields_repr(item) -> str:
-    """The `repr` of a dataclass as it makes it itself, or a shortened field on each line where that fills a screen."""
+    """Standard `repr` of a dataclass, or one shortened field per line if that fills a screen."""
     parts = [(field.name, getattr(item, field.name)) for field in fields(item) if field.repr]
     name = type(item).__qualname__
     text = f"{name}({', '.join(f'{key}={value!r}' for key, value in parts)})"
@@ -75,16 +75,16 @@ class HasParts(Protocol):
     """Class whose `repr` is made of parts."""
 
     def _parts(self) -> tuple[str, ...]:
-        """Parts of the `repr`: a name and its value, ``dt=0.01`` or ``events: none``, or any other words."""
+        """Parts of the `repr`: a name and its value, such as ``dt=0.01`` or ``events: none``, or any other words."""
 
 
 def parts_repr(item: HasParts) -> str:
-    """The `repr` of an object from its parts, broken where a line is full."""
+    """`repr` of an object from its parts, broken at full lines."""
     return lines_repr(type(item).__name__, *item._parts())
 
 
 def lines_repr(name: str, *parts: str) -> str:
-    """``name(part, ...)``, broken between parts, and parts cut, so that no line is longer than the screen is wide."""
+    """``name(part, ...)`` broken between parts, with parts cut to the width of the screen."""
     lines, indent = [f"{name}("], " " * (len(name) + 1)
     for k, part in enumerate(parts):
         end = ")" if k == len(parts) - 1 else ","
@@ -100,7 +100,7 @@ def lines_repr(name: str, *parts: str) -> str:
 
 
 def counted(names: Iterable[str], most: int = 8) -> str:
-    """Names with how often each occurs, in the order in which they first do: ``30 Block, 20 Sphere``."""
+    """Names with their counts, in order of first occurrence: ``30 Block, 20 Sphere``."""
     found = Counter(names)
     told = [name if times == 1 else f"{times} {name}" for name, times in list(found.items())[:most]]
     return ", ".join(told + ["..."] * (len(found) > most)) or "none"

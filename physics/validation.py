@@ -1,4 +1,4 @@
-"""Checks of what users hand in. Every failure is a ValueError that names field, value and what is allowed."""
+"""Checks of users' arguments. Every failure is a ValueError that names field, value and allowed values."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FLOAT64 = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
-    """`value` as a float64 array, where it holds real numbers: no bools, strings, complex or masked ones, no None."""
+    """`value` as a float64 array of real numbers: no bools, strings, complex or masked ones, no None."""
     array = _real(value)
     if array is None:
         raise ValueError(f"{field} is {shown(value)}; allowed {allowed}")
@@ -41,7 +41,7 @@ def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
 
 
 def _real(value: ArrayLike) -> np.ndarray | None:
-    """`value` as a float64 array, or None where it is no array of real numbers."""
+    """`value` as a float64 array; None if it is no array of real numbers."""
     if type(value) is np.ndarray:
         array = value
     else:
@@ -90,7 +90,7 @@ def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarray:
-    """`value` for every world and body: float64 of `shape` (worlds, bodies, n), read-only where it is the same for all.
+    """`value` for every world and body: float64 of `shape` (worlds, bodies, n), read-only if equal for all.
 
     Allowed are (worlds, bodies, n), and (bodies, n) for all worlds alike. Of one body the axis of bodies may be left
     out: (n,) for all worlds alike, (worlds, n) a row for each world. Of several bodies two axes are always (bodies, n),
@@ -113,14 +113,14 @@ def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarr
 
 
 def _given(array: np.ndarray) -> str:
-    """An array of a wrong shape, in a message."""
+    """Array of a wrong shape, in words for a message."""
     return f"has shape {array.shape}" if array.ndim else f"is {shown(array)}"
 
 
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
     """Copy `value` to `target`, a contiguous float64 array (worlds, bodies, n); `value` as in `batch`, all finite.
 
-    Copied and looked at in one pass: after an error `target` is changed, too. For what is handed in with every step.
+    The copy and the check are one pass, for arrays of every step. After an error `target` is changed, too.
     """
     if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
         array = value
@@ -140,7 +140,7 @@ def _not_finite(array: np.ndarray, field: str) -> ValueError:
 
 
 def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> ValueError:
-    """The error about an array of numbers that are not all `good`: of a long one it shows the first that is not."""
+    """Error about an array of numbers that are not all `good`; for a long one it shows the first bad number."""
     if array.size <= 9:
         return ValueError(f"{field} is {shown(array)}; allowed {allowed}")
     place = np.unravel_index(int(np.argmin(good)), array.shape)
@@ -197,7 +197,7 @@ def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> in
 
 
 def index(value: int, count: int, field: str) -> int:
-    """An index of one of `count` things, from 0."""
+    """Index of one of `count` things, from 0."""
     is_integer = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_integer or not 0 <= value < count:
         raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}")
@@ -205,7 +205,7 @@ def index(value: int, count: int, field: str) -> int:
 
 
 def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> str:
-    """One of the `names`; the message lists the nearest first, and what is allowed `besides`."""
+    """One of the `names`; the message lists the nearest first, and further allowed values, `besides`."""
     names = list(names)
     if not isinstance(value, str) or value not in names:
         order = nearest_first(value, names) if isinstance(value, str) else names
@@ -243,5 +243,5 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
 
 
 def unit(array: np.ndarray, length: Any) -> np.ndarray:
-    """`array` divided by its `length`; where that is 1 to rounding as it is, so that doing it twice changes nothing."""
+    """`array` divided by its `length`, or unchanged if that is 1 to rounding, so that a repetition changes nothing."""
     return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

@@ -1,4 +1,4 @@
-"""The version of the installed package, or of the sources where they run as they are."""
+"""Version of the installed package, or of the sources."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ UNKNOWN = "0+unknown"
 def version() -> str:
     """Version of `NAME`: from the sources' pyproject.toml if it lies beside this package, else from the installation.
 
-    Sources count first: with them on the path, an installation may be of other ones.
+    The sources come first: if they are on the path, an installed version may be another one.
     """
     return _of_sources(Path(__file__).parents[1] / "pyproject.toml") or _of_installation()
 

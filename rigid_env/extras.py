@@ -1,4 +1,4 @@
-"""Optional dependencies: which package of an extra is missing, and the line that installs it.
+"""Optional dependencies: report the missing package of an extra, and the line that installs it.
 
 A command that cannot do without calls `require` before anything runs. One that has more to give than a picture asks
 `lacking`, and ends with that line. Nothing is imported to find out.
@@ -32,7 +32,7 @@ The extra `agents` brings tensorboard, moviepy and imageio-ffmpeg as well: name 
 """
 
 CPU_TORCH = "--index-url https://download.pytorch.org/whl/cpu"
-"""Where the small torch is, for the processor: the one that pip finds brings CUDA on Linux."""
+"""Option of pip that finds torch for the processor alone; without it pip on Linux installs CUDA, too."""
 
 SOURCES = Path(__file__).parents[1]
 
@@ -58,7 +58,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
 
 def lacking(extra: str, *modules: str, purpose: str) -> str:
-    """Name the missing modules of an extra and the line that installs them; "" where none is missing.
+    """Names of an extra's missing modules and the line that installs them; "" if none is missing.
 
     Arguments as of `require`, which raises instead.
     """
@@ -82,9 +82,10 @@ def is_installed(module: str) -> bool:
 
 
 def install_line(extra: str, has_torch: bool = True) -> str:
-    """The line that installs an extra: in a checkout of the sources the editable one, too.
+    """Command that installs an extra; in a checkout of the sources it installs these as editable, too.
 
-    Without torch a line for the small one, of the same versions, stands behind it; it is to be run first.
+    If torch is missing, a second line follows, which installs the small torch of the same versions. It must be run
+    first.
     """
     line, torch = f'pip install "rigid-env[{extra}]"', f"pip install torch {CPU_TORCH}"
     if (SOURCES / "pyproject.toml").is_file() and (SOURCES / "constraints.txt").is_file():

@@ -1,4 +1,4 @@
-"""The engine's name `physics` taken by another file: said when the package is imported, and with the way out.
+"""Detect another file in place of the engine `physics`, at the import of this package, and print a remedy.
 
 Python looks for `physics` in the working folder first (``python -m``, ``python -c``) or in the folder of the script. A
 `physics.py` there, or another distribution of that name, hides the engine. Nothing is imported to find out.
@@ -11,12 +11,12 @@ from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 
 ENGINE, MARK, IMPORTED = "physics", "kernels", "physics.world.world"
-"""The package looked for, a subpackage that only the engine's has, and a module that its first file imports: another
+"""Package to find, a subpackage that only the engine has, and a module that its first file imports. Another
 distribution installed into the same folder overwrites that file alone."""
 
 
 def check_engine_is_found() -> None:
-    """Raise if ``import physics`` would give, or has given, something else than the engine.
+    """Raise an error if ``import physics`` gives, or has given, a module other than the engine.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def _message(spec: ModuleSpec) -> str:
 
 
 def _distribution_of(path: str) -> str | None:
-    """Name of the distribution that a file of the engine's name came with."""
+    """Name of the distribution that installed a file of the engine's name."""
     from importlib.metadata import packages_distributions
     from pathlib import Path
 

@@ -55,7 +55,7 @@ def contacts_of(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def contact_samples(
     times: Sequence[float], found: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]
 ) -> ContactSamples:
-    """Join what `contacts_of` gave at these times."""
+    """Join the results of `contacts_of` at these times."""
     ends, points, forces = (np.concatenate(parts) for parts in zip(*found))
     t = np.repeat(np.asarray(times, dtype=np.float64), [len(each) for each, _, _ in found])
     body, end = ends[:, 0], ends[:, 1]

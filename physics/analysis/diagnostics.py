@@ -1,4 +1,4 @@
-"""Energy, momenta and gaps of a world: what one looks at, never what the step needs."""
+"""Energy, momenta and gaps of a world, for users; no step reads them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from physics.world.world import World
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
+    """Energy, momenta and gaps per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
     potential_energy: np.ndarray  # [J]: of gravity (0 at the origin), springs of contact, and fields that have one
@@ -48,10 +48,10 @@ class Diagnostics:
 
 
 def diagnose(world: World) -> Diagnostics:
-    """Energy, momenta and gaps of every body of `world` now.
+    """Return energy, momenta and gaps of every body of `world` now.
 
-    Kinetic energy is ½ P·v + ½ L·ω, potential energy -m g·x and what fields (`Field.energy`) add,
-    and springs of contact.
+    Kinetic energy is ½ P·v + ½ L·ω. Potential energy is -m g·x, plus the energies of fields (`Field.energy`) and of the
+    springs of contact.
     """
     validation.instance(world, World, "world", "a physics.World")
     return _diagnose(world)
@@ -82,7 +82,7 @@ def _diagnose(world: World) -> Diagnostics:
 
 
 def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """Loads and energies of the scene's fields now.
+    """Return loads and energies of the scene's fields now.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """`look_at` in the workspace of a step, which therefore must not be taken meanwhile."""
+    """Do `look_at` in the workspace of a step; no step may be taken meanwhile."""
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes

@@ -1,4 +1,4 @@
-"""Events of a run: what happened to bodies, read from a world's log and told from its contacts."""
+"""Events of a run, from a world's log and from changes of its contacts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened to a body, at a wall, with another body or alone.
+    """Event of a body, at a wall, with another body or alone.
 
     An ``impact`` is one event for each pair of bodies, or body and wall, however many contacts they have: `impulse` is
     the sum over these. The change of a body's momentum by impacts is the sum of `impulse` over the events of which it
@@ -67,7 +67,7 @@ class Event:
 
 
 def logged_events(world: World, start: float) -> list[Event]:
-    """Events of the last call of a step that found room in the log, in the order of time.
+    """Events of the last call of a step that fitted into the log, in the order of time.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def named(events: list[Event], names: Sequence[str]) -> list[Event]:
 
 
 def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pair, float]:
-    """When each resting contact of world 0 last pushed, as known at the time t.
+    """Time at which each resting contact of world 0 last pushed, as known at the time t.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pa
 
 
 def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: float) -> list[Event]:
-    """Contacts that began and ended between two samples, from what `last_pushes` gives at both; the later is at t [s].
+    """Contacts that began and ended between two samples, from `last_pushes` at both; the later sample is at t [s].
 
-    A contact ends when it last pushed: what no longer pushes stays in the set until it has left its slop.
+    A contact ends at its last push. It stays in the set after that until its gap exceeds the slop.
     """
     began = [("touch", pair, t) for pair in now.keys() - before.keys()]
     ended = [("release", pair, before[pair]) for pair in before.keys() - now.keys()]
@@ -135,6 +135,6 @@ def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: f
 
 
 def fault_events(world: World, t: float) -> list[Event]:
-    """The fault of the last step of world 0, if it had one; `t` is the end of that step [s]."""
+    """Fault of the last step of world 0, as events: one or none; `t` is the end of that step [s]."""
     report = world.report
     return [Event(t, "fault", int(report.fault_body[0]))] if report.faults[0] else []

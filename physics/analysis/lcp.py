@@ -1,4 +1,4 @@
-"""The linear complementarity problem with checked arguments and a result that says what it means."""
+"""The linear complementarity problem with checked arguments and an explained result."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PSD_TOLERANCE = 2.0**-46  # times n and the largest entry: what rounding may do 
 
 
 class LcpStatus(IntEnum):
-    """End of a pivoting solver. `message` says what to do."""
+    """End of a pivoting solver. `message` gives advice."""
 
     SOLVED = scaling_and_certificate.LCP_SOLVED
     RAY = scaling_and_certificate.LCP_RAY

@@ -1,4 +1,4 @@
-"""Particle systems, and a rigid body seen as one.
+"""Particle systems, and a rigid body as one of them.
 
 The state of n particles is one vector of 6n numbers, position and velocity of
 the first particle, then of the second, and so on: `pack` and `unpack` go to and
@@ -133,7 +133,7 @@ def rigid_velocities(positions: ArrayLike, centre: ArrayLike, linvel: ArrayLike,
 
 @dataclass(frozen=True, eq=False)
 class RigidCloud:
-    """The rigid body that n particles amount to.
+    """Rigid body made of n particles.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class RigidCloud:
 
     @property
     def angvel(self) -> np.ndarray:
-        """Angular velocity I⁻¹ L (3,) [rad/s]; ValueError for a cloud all on one line, which has none."""
+        """Angular velocity I⁻¹ L (3,) [rad/s]; ValueError for particles on one line, which have none."""
         inertia = check_inertia(self.mass_properties.inertia, "mass_properties.inertia")
         return np.linalg.solve(inertia, self.angular_momentum)
 

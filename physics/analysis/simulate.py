@@ -100,7 +100,7 @@ def simulate(
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
-    """Duration, sample interval and step [s], checked; defaults in place of None."""
+    """Check duration, sample interval and step [s], with defaults in place of None."""
     duration = float(validation.non_negative(duration, (), "duration"))
     if dt is not None:
         dt = float(validation.positive(dt, (), "dt"))
@@ -130,7 +130,7 @@ def _loads(wrench, world: World) -> Callable[[float], np.ndarray | None]:
 
 
 def _interval(world: World, watch, start: float, end: float, load, steps: int, dt: float | None):
-    """Take the steps between two samples: events, and the report of all of them."""
+    """Take the steps between two samples: their events, and the report of all of them."""
     if steps == 1 or world.actuation is None or not world.actuation.actuator.remembers:
         events = watch(world, start, end, partial(world.step, load, steps, dt))
         return events, world.report
@@ -150,13 +150,13 @@ def _sample(world: World) -> tuple[np.ndarray, ...]:
 
 
 class _Touching:
-    """Events of time stepping: impacts from its log, the rest from contacts and faults at the samples."""
+    """Finder of events in time stepping: impacts from the log, others from contacts and faults at the samples."""
 
     def __init__(self):
         self._pushes: dict[Pair, float] = {}
 
     def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
-        """Take a step; the events of it."""
+        """Take a step and return its events."""
         events = _logged(world, start, end, step)
         before, self._pushes = self._pushes, last_pushes(world, self._pushes, end)
         events += contact_events(before, self._pushes, end) + fault_events(world, end)
@@ -164,7 +164,7 @@ class _Touching:
 
 
 def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
-    """Take a step; its log, for which room is made and the step repeated if need be."""
+    """Take a step; return its log, for which the step is repeated with more room if necessary."""
     before = world.snapshot()
     step()
     most = int(world.event_counts.max())

@@ -82,7 +82,7 @@ class Trajectory:
         )  # fmt: skip
 
     def _why(self) -> str:
-        """The gravest status, and when it was met first: for the `repr`; `messages` of the reports tell more."""
+        """Gravest status and the time of its first occurrence, for the `repr`; `messages` of the reports say more."""
         met = [int(report.status[0]) for report in self.reports]
         worst = max(met, key=Status.severity, default=int(Status.OK))
         if worst == Status.OK:
@@ -92,7 +92,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """True if every interval's report was."""
+        """True if the reports of all intervals are OK."""
         return all(report.ok for report in self.reports)
 
     # --- bodies ------------------------------------------------------------------------------------------------
@@ -158,7 +158,7 @@ class Trajectory:
         return load_optional("pandas", "Trajectory.to_pandas").DataFrame(columns)
 
     def plot(self, path: str | Path | None = None):
-        """Draw the motion over time: of one body its vectors, of several heights, speeds and spins.
+        """Draw the motion over time: vectors of a single body; heights, speeds and spins of several.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ class Trajectory:
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:
-        """Read what `to_npz` has written, the reports apart; nothing in a file is run.
+        """Read a file of `to_npz`, without reports and without running code from the file.
 
         Parameters
         ----------
@@ -262,7 +262,7 @@ class BodyTrajectory:
 
     @property
     def label(self) -> str:
-        """Its name, or its index."""
+        """Name of the body, or its index."""
         return self.name or f"body {self.body}"
 
     def plot(self, path: str | Path | None = None):
@@ -271,7 +271,7 @@ class BodyTrajectory:
 
 
 def _checked(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Arrays of a file, if their shapes fit each other, their times rise, and their numbers are finite."""
+    """Check the arrays of a file: matching shapes, rising times, finite numbers."""
     shape = samples["energy"].shape
     if len(shape) != 2 or 0 in shape:
         raise ValueError(f"energy has shape {shape}")
@@ -285,7 +285,7 @@ def _checked(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _matching(scene: Scene | None, samples: dict[str, np.ndarray]) -> Scene | None:
-    """The scene, if it has as many bodies as the samples."""
+    """Return the scene if it has as many bodies as the samples, else None."""
     bodies = samples["pos"].shape[1]
     if scene is not None and len(scene.bodies) != bodies:
         raise ValueError(f"its scene has {len(scene.bodies)} bodies, its samples have {bodies}")

@@ -39,7 +39,7 @@ def events_of(parts: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
 
 
 def contact_arrays(contacts: ContactSamples | None) -> dict[str, np.ndarray]:
-    """Arrays with a row for each contact at each sample; nothing where they are unknown."""
+    """Arrays with a row for each contact at each sample; empty where contacts are unknown."""
     return {} if contacts is None else {f"{CONTACTS}{name}": getattr(contacts, name) for name in NAMES}
 
 
@@ -55,7 +55,7 @@ def contacts_of_file(parts: Mapping[str, np.ndarray]) -> ContactSamples | None:
 
 
 def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
-    """Bodies and walls of a scene, its effects apart; nothing where it is unknown."""
+    """Bodies and walls of a scene without its effects; empty where the scene is unknown."""
     if scene is None:
         return {}
     corners = [body.polyhedron.vertices if body.kind == "hull" else np.zeros((0, 3)) for body in scene.bodies]

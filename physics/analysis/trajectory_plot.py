@@ -1,4 +1,4 @@
-"""Picture of a trajectory: how it moves over time."""
+"""Pictures of a trajectory: its motion over time."""
 
 from __future__ import annotations
 

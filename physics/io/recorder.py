@@ -1,4 +1,4 @@
-"""The last steps of a batch of worlds, kept so that what went wrong can be replayed bit for bit."""
+"""Keep the last steps of a batch of worlds, for a bit-for-bit replay of faults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from physics.world.world import World
 
 
 class _Load(NamedTuple):
-    """Arguments of a call, of all worlds."""
+    """Arguments of a call, for all worlds."""
 
     wrench: np.ndarray
     past: np.ndarray | None  # past the actuator
@@ -42,9 +42,9 @@ class _Chapter:
 class Recorder:
     """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
 
-    It is told of every step, whoever takes it (`World.step`, `Stepper`, an environment), and of every change by
-    `set_state`, `set_parameters` and `restore`; arrays of the world written past these are not seen. Worlds are
-    independent, so that a file holds one world only. Without a recorder a step does nothing for it.
+    The recorder sees every step of `World.step`, of a `Stepper` and of an environment. It sees every change by
+    `set_state`, `set_parameters` and `restore`, but not arrays of the world written directly. Worlds are independent,
+    so a file holds one world only. A world without a recorder does no work for it.
 
     Parameters
     ----------
@@ -107,18 +107,18 @@ class Recorder:
         world.recorder = self
 
     def stop(self) -> None:
-        """Let the world go on without it; what is kept stays."""
+        """Detach from the world; the kept steps stay."""
         if self.world.recorder is self:
             self.world.recorder = None
 
     # --- told by the world -------------------------------------------------------------------------------------
 
     def changed(self, worlds: np.ndarray | slice) -> None:
-        """These worlds were changed from outside."""
+        """Note that these worlds were changed from outside."""
         self._changed[worlds] = True
 
     def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
-        """A step is about to be taken."""
+        """Note the start of a step."""
         chapter = self._chapters[-1]
         if len(chapter.loads) == self.keep:
             chapter = _Chapter()
@@ -133,7 +133,7 @@ class Recorder:
         chapter.loads.append(_Load(wrench.copy(), None if past is None else past.copy(), steps, dt))
 
     def after(self) -> None:
-        """The step has been taken."""
+        """Note the end of a step."""
         self._chapters[-1].states.append(self.world.state.copy())
         if self.folder is None or len(self.files) == self.limit:
             return
@@ -145,7 +145,7 @@ class Recorder:
             self.files.append(self.recording(world, reason).save(_free_path(self.folder, status.name.lower())))
 
     def undone(self) -> None:
-        """The step that was about to be taken is none: all is as before."""
+        """Drop the announced step: it was not taken, and the world is as before."""
         chapter = self._chapters[-1]
         del chapter.loads[len(chapter.states) :]
 
@@ -156,7 +156,7 @@ class Recorder:
         return self.recording(world, reason).save(path)
 
     def recording(self, world: int = 0, reason: str = "requested") -> Recording:
-        """The last steps of one world, at least `keep` if so many were taken.
+        """Last steps of one world, at least `keep` if so many were taken.
 
         Raises
         ------
@@ -191,7 +191,7 @@ class Recorder:
 
 
 def _past(loads: Sequence[_Load], world: int, bodies: int) -> np.ndarray | None:
-    """(n, bodies, 6) loads of one world past its actuator; None where there are none."""
+    """Loads (n, bodies, 6) of one world past its actuator; None without any."""
     if all(load.past is None for load in loads):
         return None
     nothing = np.zeros((bodies, 6))
@@ -199,7 +199,7 @@ def _past(loads: Sequence[_Load], world: int, bodies: int) -> np.ndarray | None:
 
 
 def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
-    """(chosen, rows of a world, columns): copied parts of an array whose rows belong to worlds in turn."""
+    """Copied rows (chosen, rows of a world, columns) of some worlds in an array with each world's rows in turn."""
     if len(array) < worlds:  # the contact memory of a scene without contact: one row, never used
         return np.broadcast_to(array, (len(chosen), *array.shape)).copy()
     return array.reshape(worlds, len(array) // worlds, *array.shape[1:])[chosen]
@@ -217,7 +217,7 @@ def _starts_of(chapter: _Chapter, world: int, first: int, count: int, scene: dic
 
 
 def _free_path(folder: Path, name: str) -> Path:
-    """A path in `folder` that no file has yet, also when several processes write there."""
+    """Path in `folder` that no file has, even if several processes write there."""
     number = 0
     while True:
         path = folder / f"{name}-{number}.npz"

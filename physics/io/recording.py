@@ -1,7 +1,7 @@
-"""A stretch of one world's steps as a file, and its replay, bit for bit.
+"""A file of one world's steps, and its bit-for-bit replay.
 
-A world's future is decided by its `Snapshot`, the wrenches and the lengths of its steps: a recording holds these, the
-scene as text, and the state after every step, so that a replay can tell whether it came out the same.
+The future of a world follows from its `Snapshot`, and from the wrenches and lengths of its steps. A recording holds
+these, the scene as text, and the state after every step, with which a replay is compared.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ OTHER_COMPILER = 1.0e-6
 
 @dataclass(frozen=True)
 class Start:
-    """A point from which the recorded world went on: the first one, and each at which it was changed from outside.
+    """State from which the recorded world continued: the first one, and one after each change from outside.
 
     Parameters
     ----------
@@ -112,13 +112,13 @@ class Recording:
         return len(self.states)
 
     def world(self) -> World:
-        """A `World` of one world as it was before the first step."""
+        """Make a `World` of one world in the state before the first step."""
         world = World(self.scene, dt=float(self.dt[0]) if len(self) else 0.01, accuracy=self.accuracy)
         world.restore(self.starts[0].snapshot)
         return world
 
     def replay(self) -> Replay:
-        """Take the recorded steps again, in a new `World`."""
+        """Take the recorded steps again in a new `World`."""
         world = self.world()
         starts = {start.step: start.snapshot for start in self.starts}
         steppers: dict[tuple[int, float], Stepper] = {}
@@ -138,13 +138,13 @@ class Recording:
         return Replay(self, np.array(states).reshape(self.states.shape), tuple(reports), np.array(energies))
 
     def past_actuator(self, world: World, k: int) -> AbstractContextManager[None]:
-        """Let the load of call `k` that went past the actuator act in a world during a block."""
+        """Let the load of call `k` that bypassed the actuator act in a world during a block."""
         if self.past is None or world.actuation is None:
             return nullcontext()
         return world.actuation.passed_by(self.past[k : k + 1])
 
     def save(self, path: str | Path) -> Path:
-        """Write it as ``.npz`` (`load` reads it); returns the path."""
+        """Write the recording as ``.npz`` (`load` reads it); return the path."""
         head = {
             "format": 1 if self.past is None else FORMAT, "scene": to_toml(self.scene),
             "accuracy": asdict(self.accuracy), "reason": self.reason, "origin": self.origin,
@@ -203,7 +203,7 @@ class Recording:
 
 
 def _from_parts(head: dict[str, Any], content: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Fields of a recording, apart from its scene, of the head and the arrays of a file."""
+    """Fields of a recording except its scene, from the head and the arrays of a file."""
     head_value(head, "scene", is_text, "a scene as TOML")
     settings = head_value(head, "accuracy", lambda value: Accuracy(**value), "the fields of a physics.Accuracy")
     about = head_value(head, "origin", _is_table_of_text, "names and texts")
@@ -224,13 +224,13 @@ def _is_table_of_text(value: Any) -> bool:
 
 
 def _widened(table: np.ndarray) -> np.ndarray:
-    """A report table (..., columns) of a version with fewer columns, with zeros for the others."""
+    """Report table (..., columns) of a version with fewer columns, filled with zeros."""
     return np.pad(table, [(0, 0)] * (table.ndim - 1) + [(0, max(0, at.REPORT_SIZE - table.shape[-1]))])
 
 
 @dataclass(frozen=True)
 class Replay:
-    """Outcome of taking the steps of a `Recording` again.
+    """Outcome of a replay of a `Recording`.
 
     Parameters
     ----------
@@ -257,16 +257,16 @@ class Replay:
 
     @property
     def tolerance(self) -> float:
-        """Tolerance of the comparison: 0, for bits; `OTHER_COMPILER` where the recording's compiler rounds differently.
+        """Tolerance of the comparison: 0 (bits), or `OTHER_COMPILER` if the recording's compiler rounds differently.
 
-        A state may differ by so much of itself, and of 1 of its unit.
+        A number x of a state may differ by the tolerance times (1 + |x|).
         """
         makers = {self.recording.origin["compiler"], COMPILER}
         return OTHER_COMPILER if FUSED in makers and len(makers) > 1 else 0.0
 
     @property
     def first_difference(self) -> int | None:
-        """The first step after which a state differs from the recorded one, in a bit or beyond `tolerance`; or None."""
+        """First step whose state differs from the recorded one, by a bit or beyond `tolerance`; None if all agree."""
         ours, theirs = self.states, self.recording.states
         is_other = ours.view(np.int64) != theirs.view(np.int64)
         if self.tolerance > 0.0:
@@ -276,18 +276,18 @@ class Replay:
 
     @property
     def is_identical(self) -> bool:
-        """True if every state came out the same, bit for bit."""
+        """True if every state is the recorded one, bit for bit."""
         return np.array_equal(self.states.view(np.int64), self.recording.states.view(np.int64))
 
     @property
     def distances(self) -> np.ndarray:
-        """(n,) largest distance of any body from where it was recorded [m]."""
+        """Largest distance (n,) of any body from its recorded place [m]."""
         offset = (self.states - self.recording.states)[:, :, at.POS : at.POS + 3]
         return np.sqrt((offset * offset).sum(axis=-1)).max(axis=1, initial=0.0)
 
     @property
     def times(self) -> np.ndarray:
-        """(n,) time after each call since the world began [s]."""
+        """Times (n,) after each call since the world began [s]."""
         recording, times, now = self.recording, [], 0.0
         starts = {start.step: start.snapshot.time for start in recording.starts}
         for k, (steps, dt) in enumerate(zip(recording.steps.tolist(), recording.dt.tolist())):
@@ -297,7 +297,7 @@ class Replay:
 
 
 def origin() -> dict[str, str]:
-    """Software and processor of a recording made here: where any differs, a replay may differ in the last bits."""
+    """Software and processor of a new recording; where any differs, a replay may differ in the last bits."""
     return {
         "version": version(),
         "kernels": folder_name(),  # digest of their sources

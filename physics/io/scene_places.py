@@ -1,7 +1,8 @@
-"""Places in the text of a scene file: on which line a table or a key stands.
+"""Lines of tables and keys in the text of a scene file.
 
-The reader of TOML gives values without places. They are found again in the text: a table [[bodies]] by its header, a
-key below it, before the next header. Of tables written inline, ``bodies = [{...}]``, the line of the list is told.
+The reader of TOML gives values without places, so these are searched in the text. A table [[bodies]] is found by its
+header, a key below it, before the next header. Errors in inline tables, ``bodies = [{...}]``, name the line of the
+list.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ class Places:
         return ValueError(f"{self._source}, line {line}: {place}{message}")
 
     def error_in_table(self, name: str, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table [name], such as ``environment.goal``, or about the table itself."""
+        """An error about a key of the table [name], such as ``environment.goal``, or about the table."""
         return ValueError(f"{self._source}, line {self._line_in_table(name, key)}: {name}: {message}")
 
     def _line_in_table(self, name: str, key: str | None) -> int:
-        """Line of a key of a table, or of what is nearest to it: tables in tables may be written inline."""
+        """Line of a key in a table, or of the nearest text: nested tables may be written inline."""
         parts = [*name.split("."), key]
         for depth in range(len(parts) - 1, 0, -1):
             dotted = r"\s*\.\s*".join(rf"[\"']?{re.escape(part)}[\"']?" for part in parts[:depth])
@@ -52,7 +53,7 @@ class Places:
         return self._key_line(0, parts[0]) or 1
 
     def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
-        """An error of the whole scene, at the table that its message names, by number or, of an effect, by class."""
+        """Error about the whole scene, placed at the table in its message, given by number or by an effect's class."""
         told = re.search(r"\b(bodies|walls|effects)\[(\d+)\]", message)
         if told:
             return self._error_at(told.group(1), int(told.group(2)), message)
@@ -68,7 +69,7 @@ class Places:
         return ValueError(f"{self._source}, line {line}: {message}")
 
     def _table_line(self, name: str | None, index: int) -> int:
-        """Line of a table's header; 0 for the head of the file, and for a table written inline."""
+        """Line of a table's header; 0 for the head of the file, and for an inline table."""
         if name is None:
             return 0
         header = re.compile(rf"\s*\[\[\s*[\"']?{name}[\"']?\s*\]\]")

@@ -1,4 +1,4 @@
-"""Scenes as TOML files: what a scene is, written down without its code.
+"""Scenes as TOML files: the description of a scene without code.
 
 One table per body, wall and effect; `kind` is the class, the other keys are its parameters under their names, in SI
 units. What is left out keeps its default. Files are read with the standard library's reader and written with tomlkit.
@@ -62,7 +62,7 @@ class SceneFile:
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:
-    """Write a scene as TOML; `load_scene` gives an equal one.
+    """Write a scene as TOML; `load_scene` reads an equal one.
 
     Fields of your own are written by the name of their class; `load_scene` wants that class among its `kinds`.
 
@@ -77,7 +77,7 @@ def save_scene(scene: Scene, path: str | Path) -> None:
 
 
 def to_toml(scene: Scene) -> str:
-    """The text that `save_scene` writes."""
+    """Text of the file that `save_scene` writes."""
     document = tomlkit.document()
     document.add(tomlkit.comment("Metres, kilograms, seconds, radians; quaternions (w, x, y, z), body to world."))
     document.add("format", FORMAT)
@@ -111,7 +111,7 @@ def _plain(value):
 
 @known_keywords
 def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
-    """Read a scene from a TOML file. A table [environment] is left to `rigid_env`.
+    """Read a scene from a TOML file. `rigid_env` reads its table [environment].
 
     Parameters
     ----------
@@ -143,12 +143,12 @@ def load_file(path: str | Path, kinds: Sequence[type[Field]] = ()) -> SceneFile:
 
 
 def from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> Scene:
-    """The scene that a text describes; `source` is what messages call it."""
+    """Make the scene of a text; messages name the text `source`."""
     return file_from_toml(text, source, kinds).scene
 
 
 def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> SceneFile:
-    """All that a text of a scene file holds; `source` is what messages call it."""
+    """Read all of a scene file's text; messages name the text `source`."""
     kinds = _own_kinds(kinds)
     try:
         content = tomllib.loads(text)
@@ -181,7 +181,7 @@ def _check_head(places: Places, content: dict) -> None:
 
 
 def _own_kinds(kinds) -> tuple:
-    """The classes of a user's fields that a file may name."""
+    """Classes of a user's fields that a file may name."""
     found = tuple(kinds) if isinstance(kinds, Iterable) else (kinds,)
     for kind in found:
         if not isinstance(kind, type) or not issubclass(kind, Field):
@@ -190,7 +190,7 @@ def _own_kinds(kinds) -> tuple:
 
 
 def _syntax_error(text: str, source: str, message: str) -> str:
-    """The reader's message, its place in front and the line itself behind."""
+    """Error with the reader's message, the place before it and the line after it."""
     told = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
     if told is None:
         return f"{source}: {message}"

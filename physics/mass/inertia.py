@@ -55,7 +55,7 @@ def _positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarra
 
 
 def _hollow(radius: float, inner_radius: float | None) -> tuple[float, float]:
-    """Outer and inner radius, validated; `inner_radius` None: the wall is infinitely thin."""
+    """Outer and inner radius, checked; `inner_radius` None is an infinitely thin wall."""
     outer = float(_positive(radius, (), "radius"))
     inner = outer if inner_radius is None else float(_floats(inner_radius, (), "inner_radius"))
     if not 0 <= inner <= outer:
@@ -64,7 +64,7 @@ def _hollow(radius: float, inner_radius: float | None) -> tuple[float, float]:
 
 
 def _of_revolution(across: float, along: float) -> np.ndarray:
-    """Tensor of a body of revolution about its y axis: moments across and along the axis."""
+    """Tensor of a body of revolution about its y axis, from moments across and along the axis."""
     return np.diag([across, along, across])
 
 
@@ -79,7 +79,7 @@ def ellipsoid_moments(semi_axes: np.ndarray, mass: float | np.ndarray) -> np.nda
 
 
 def _plane_symmetric(axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
-    """(b² + c², a² + c², a² + b²) mass, which the moments of a body with three planes of symmetry are a share of."""
+    """(b² + c², a² + c², a² + b²) mass: moments of a body with three planes of symmetry are a share of these."""
     a, b, c = np.moveaxis(axes * axes, -1, 0)
     return np.stack([b + c, a + c, a + b], axis=-1) * np.asarray(mass)[..., None]
 
@@ -139,7 +139,7 @@ def disk(radius: float, mass: float) -> np.ndarray:
 
 
 def rod(length: float, mass: float) -> np.ndarray:
-    """Inertia of a thin rod along body y: M L²/12 across, 0 along (a part, but no body alone)."""
+    """Inertia of a thin rod along body y: M L²/12 across, 0 along (allowed as a part, not as a whole body)."""
     length = float(_positive(length, (), "length"))
     return _of_revolution(across=float(_positive(mass, (), "mass")) * length**2 / 12, along=0.0)
 
@@ -206,7 +206,7 @@ class MassProperties:
             object.__setattr__(self, name, array)
 
     def placed(self, pos: ArrayLike = (0, 0, 0), R: ArrayLike | None = None) -> MassProperties:
-        """The same body in the frame in which its own has origin `pos` (3,) [m] and axes R (3, 3)."""
+        """Same body in another frame, in which its frame has the origin `pos` (3,) [m] and axes R (3, 3)."""
         R = np.eye(3) if R is None else _floats(R, (3, 3), "R")
         return MassProperties(self.mass, _floats(pos, (3,), "pos") + R @ self.centre, rotate(self.inertia, R))
 
@@ -270,7 +270,7 @@ def principal_axes(inertia: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_range(masses: np.ndarray, moments: np.ndarray) -> None:
-    """Refuse masses (n,) [kg] and principal moments (n, 3) [kg m²] that a float cannot be divided by.
+    """Refuse masses (n,) [kg] and principal moments (n, 3) [kg m²] with infinite inverses.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def check_range(masses: np.ndarray, moments: np.ndarray) -> None:
 
 
 def check_inertia(inertia: ArrayLike, field: str) -> np.ndarray:
-    """The inertia tensor of a body that can move, or a ValueError that says why there is none.
+    """Inertia tensor of a body that can move; ValueError with the reason if there is none.
 
     Parameters
     ----------

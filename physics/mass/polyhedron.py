@@ -1,4 +1,4 @@
-"""The convex hull of points as a polyhedron: corners, polygons, edges, and its mass properties.
+"""Convex hull of points as a polyhedron: corners, polygons, edges, and mass properties.
 
 Qhull (scipy.spatial) makes the hull; its triangles are joined to polygons here, because a face of two triangles has a
 diagonal that is no edge, and triangles that should be one plane differ by rounding.
@@ -75,7 +75,7 @@ class Polyhedron:
 
     @property
     def radius(self) -> float:
-        """Radius of the sphere about the centre of mass that holds it [m]."""
+        """Radius of the bounding sphere about the centre of mass [m]."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
     @property
@@ -122,7 +122,7 @@ def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
 
 
 def _second_moment(found: np.ndarray) -> np.ndarray:
-    """The mean of r rᵀ, diagonal where it is to rounding, of a body that has a moment of inertia about every axis."""
+    """Mean of r rᵀ of a body with a moment of inertia about every axis; diagonal where it is to rounding."""
     size = np.abs(found).max()
     found = np.where(np.eye(3, dtype=bool), found, _without_noise(found, size))
     if not np.linalg.eigvalsh(np.trace(found) * np.eye(3) - found)[0] > ROUNDING * size:
@@ -185,7 +185,7 @@ def _area_vectors(corners: np.ndarray) -> np.ndarray:
 
 
 def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list[int]) -> list[int]:
-    """Those of a face's points that are its corners, counter-clockwise as seen from outside, the least index first."""
+    """Corners of a face among its points, counter-clockwise as seen from outside, the least index first."""
     from scipy.spatial import ConvexHull
 
     normal = hull.equations[face[0], :3]
@@ -198,7 +198,7 @@ def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list
 
 
 def _normals(vertices: np.ndarray, loops) -> np.ndarray:
-    """Unit normals by the area vector of each polygon (Newell): of all its corners alike."""
+    """Unit normals of polygons by their area vectors (Newell), which weigh all corners alike."""
     normals = np.empty((len(loops), 3))
     for f, loop in enumerate(loops):
         r = vertices[list(loop)] - vertices[loop[0]]
@@ -213,7 +213,7 @@ def _edges(loops) -> np.ndarray:
 
 
 def _moments(vertices: np.ndarray, loops) -> tuple[float, np.ndarray, np.ndarray]:
-    """Volume, and integrals of r and of r rᵀ over it: signed tetrahedra from the origin to triangles of the faces.
+    """Volume and its integrals of r and r rᵀ, by signed tetrahedra from the origin to triangles of the faces.
 
     Over the tetrahedron (0, a, b, c) of volume D/6, D = a·(b x c), the mean of r is s/4 with s = a + b + c, and that of
     r rᵀ is (s sᵀ + a aᵀ + b bᵀ + c cᵀ)/20.

@@ -1,1 +1,1 @@
-"""Threads: a batch of worlds shared between them, and one thread at a time for a world."""
+"""Threads that share a batch of worlds, and locks that keep a world to one thread."""

@@ -1,4 +1,4 @@
-"""Kernels compiled for the arguments they are called with, and bound to them."""
+"""Compile kernels for the types of their arguments, and bind them to the arguments."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ COMPILE_NOTICE = 1.0
 
 
 def compiled(kernel: Callable, arguments: tuple) -> Callable:
-    """The machine code of a kernel for arguments of these types.
+    """Machine code of a kernel for arguments of these types.
 
-    To call it leaves out Numba's dispatcher, which finds out the types of all arguments in each call.
+    A call of machine code skips Numba's dispatcher, which determines the types of all arguments in each call.
     """
     with backend.LOCK, compiling():
         return backend.machine_code(kernel, arguments)
 
 
 def compiled_entry(kernel: Callable, arguments: tuple):
-    """Entry of a kernel that returns nothing, for arguments of these types: what `Work` takes."""
+    """Entry of a kernel that returns nothing, for arguments of these types, as `Work` takes it."""
     with backend.LOCK, compiling():
         return entry(kernel, arguments)
 
 
 def bound(kernel: Callable, *arguments) -> Work:
-    """A kernel that returns nothing with its arguments, to be called often.
+    """Bind a kernel that returns nothing to its arguments, for many calls.
 
     Parameters
     ----------
     kernel : Callable
         Of `physics.kernels.compile.decorators.kernel`.
     *arguments
-        Arrays are bound, not copied: what they hold when a call is made counts.
+        Arrays are bound, not copied: a call reads their contents at its time.
     """
     return Work([(compiled_entry(kernel, arguments), arguments)])
 
 
 def bound_alike(key, kernel: Callable, *arguments) -> Work:
-    """`bound`, where the kernel and a `key` determine the types of all arguments: to look at each takes a while."""
+    """Bind a kernel whose types of arguments follow from it and a `key`; this saves the slow look at each argument."""
     if (kernel, key) not in _ENTRIES:
         _ENTRIES[kernel, key] = compiled_entry(kernel, arguments)
     return Work([(_ENTRIES[kernel, key], arguments)])
@@ -69,9 +69,10 @@ _ENTRIES: dict[tuple, object] = {}
 
 @contextmanager
 def compiling():
-    """Say on standard error that a kernel is being compiled, if it takes long enough to notice.
+    """Print on standard error that a kernel is being compiled, if this takes noticeably long.
 
-    The garbage collector looks at Numba's growing tables less often: it would take a tenth of the time, or a fifth.
+    Meanwhile the garbage collector scans Numba's growing tables less often; it would take a tenth or a fifth of the
+    time.
     """
     text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
     timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))

@@ -1,4 +1,4 @@
-"""Calls of kernels that Python makes, one after another."""
+"""Calls of kernels from Python, one after another."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ class DirectWork:
     Parameters
     ----------
     calls : list of (callable, tuple)
-        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: what they hold when a call is
-        made counts.
+        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents
+        at its time.
     """
 
     def __init__(self, calls: list[tuple[Callable, tuple]]):
         self._calls = [(code, list(arguments)) for code, arguments in calls]
 
     def perform(self) -> bool:
-        """Make the calls; one that raises an exception ends them with it. Returns False."""
+        """Make the calls until one raises an exception, which leaves this function, too. Returns False."""
         for code, arguments in self._calls:
             code(*arguments)
         return False
@@ -29,17 +29,17 @@ class DirectWork:
     __call__ = perform
 
     def raise_again(self) -> None:
-        """Raise nothing: `perform` has."""
+        """Do nothing: `perform` has raised the exception."""
 
     def forget(self) -> None:
-        """Forget nothing."""
+        """Do nothing: no exception is kept."""
 
     def put(self, argument: int, value: float | tuple) -> None:
-        """Give the first of the calls another value for an argument."""
+        """Replace an argument of the first call."""
         self._calls[0][1][argument] = value
 
     def then(self, other: DirectWork) -> DirectWork:
-        """These calls, and the other ones after them."""
+        """Join these calls with others after them."""
         return DirectWork([*self._calls, *other._calls])
 
 

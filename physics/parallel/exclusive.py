@@ -1,4 +1,4 @@
-"""One thread at a time for a world, and for an environment.
+"""Locks that let one thread at a time use a world or an environment.
 
 A world lends its arrays to machine code, which runs without the interpreter's lock: two steps at once would write to
 the same memory. A thread that comes while another one is at it gets an error.
@@ -20,7 +20,7 @@ from physics.annotations import Function
 
 
 def exclusive(method: Function) -> Function:
-    """Refuse a method, or a function of a world, while another thread is in one that takes the same object.
+    """Make a method or function that raises an error while another thread uses the same object.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def exclusive(method: Function) -> Function:
 
 
 def in_use(thing: Any) -> RuntimeError:
-    """The error for who comes while another thread is at it."""
+    """Error for a call while another thread uses the object."""
     name = type(thing).__name__
     if getattr(thing, "is_torn", False):
         return RuntimeError(
@@ -67,12 +67,12 @@ _WORLDS: weakref.WeakSet = weakref.WeakSet()
 
 
 def watch(world: Any) -> None:
-    """Have a world known in case the process is forked."""
+    """Register a world, to unlock it after a fork of the process."""
     _WORLDS.add(world)
 
 
 def _after_fork() -> None:
-    """Threads of the parent that were in the middle of a step are not there in the child, and will not finish it."""
+    """Unlock all worlds in a child process: the parent's threads inside a step do not exist there."""
     for world in list(_WORLDS):
         world.is_torn = not world.is_free and world.telling != threading.get_ident()
 

@@ -1,4 +1,4 @@
-"""Calls of kernels that machine code makes, from arguments that stand ready in memory (`fused.prepared_entry`)."""
+"""Calls of kernels from machine code, with arguments prepared in memory (`fused.prepared_entry`)."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class PreparedWork:
     Parameters
     ----------
     calls : list of (int, tuple)
-        A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: what they hold when a
-        call is made counts.
+        A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents at its
+        time.
     words : list of array, optional
         Their arguments as a kernel finds them, where others have them already; they are shared.
 
@@ -60,26 +60,26 @@ class PreparedWork:
             self.raise_again()
 
     def raise_again(self) -> None:
-        """Raise what one of the calls raised when they were made last, if one did."""
+        """Raise the exception of the last calls, if there was one."""
         for row in self._table:
             reraise(row[JOB_STATUS], row[JOB_EXCEPTION])
 
     def forget(self) -> None:
-        """Let none of the calls have raised anything."""
+        """Clear the exceptions of all calls."""
         self._table[:, JOB_STATUS] = 0
 
     def put(self, argument: int, value: float | tuple) -> None:
-        """Give the first of the calls another value for an argument: a number, or as many of them as it had."""
+        """Replace an argument of the first call: a number, or a group of as many numbers."""
         words, place = _words((value,)), self._places[argument]
         self._words[0][place : place + len(words)] = words
 
     @cached_property
     def _places(self) -> list[int]:
-        """Return the offsets of the words of each argument of the first call."""
+        """Offsets of the words of each argument of the first call."""
         return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
 
     def then(self, other: PreparedWork) -> PreparedWork:
-        """These calls, and the other ones after them; `put` changes the arguments of both."""
+        """Join these calls with others after them; `put` changes the arguments of both."""
         return PreparedWork([*self._calls, *other._calls], [*self._words, *other._words])
 
 
@@ -94,7 +94,7 @@ def _performing_one() -> Callable[[int], bool]:
 
 
 def _words(arguments: tuple) -> list[int]:
-    """Arguments as a kernel finds them in memory: see `physics.kernels.compile.fused.prepared_entry`."""
+    """Words of the arguments as a kernel reads them from memory: see `physics.kernels.compile.fused.prepared_entry`."""
     words: list[int] = []
     for value in arguments:
         if isinstance(value, np.ndarray):
@@ -109,6 +109,6 @@ def _words(arguments: tuple) -> list[int]:
 
 
 def entry(kernel: Callable, arguments: tuple) -> int:
-    """Entry of a kernel that returns nothing for arguments of these types, compiled where it is not yet."""
+    """Entry of a kernel that returns nothing, for arguments of these types; compiles it if necessary."""
     with backend.LOCK:  # nobody else adds to what is linked meanwhile
         return kernel.ready_entry(backend.machine_code(kernel, arguments))

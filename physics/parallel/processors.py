@@ -1,4 +1,4 @@
-"""Processors of a process: how many it may use, and the functions by which threads share them."""
+"""Processors of a process: their usable number, and system functions for threads that share them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def usable(root: Path = Path("/")) -> int:
-    """Count the processors that the process may use at once: its affinity and its container's quota allow them.
+    """Count the processors that the process may use at once, by its affinity and its container's quota.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def quota(root: Path = Path("/")) -> float:
 
 
 def _groups(root: Path) -> Iterator[Path]:
-    """Folders of the control groups that the process is in, those around them included."""
+    """Folders of the control groups of the process, outer groups included."""
     mounts = root / "sys/fs/cgroup"
     for line in _text(root / "proc/self/cgroup").splitlines():
         _, names, place = line.split(":", 2)
@@ -50,7 +50,7 @@ def _groups(root: Path) -> Iterator[Path]:
 
 
 def _share(group: Path) -> float:
-    """Processors granted by the limit of one group; inf where it has none."""
+    """Number of processors that one group's limit grants; inf without a limit."""
     limit, period = (*_text(group / "cpu.max").split(), "", "")[:2]
     if not period:
         limit, period = _text(group / "cpu.cfs_quota_us"), _text(group / "cpu.cfs_period_us")
@@ -69,12 +69,12 @@ def _text(path: Path) -> str:
 
 
 def giving_way() -> int:
-    """Address of the system's function that lets another thread have the processor; 0 where there is none."""
+    """Address of the system's function that yields the processor to another thread; 0 without one."""
     return _address("SwitchToThread" if os.name == "nt" else "sched_yield")
 
 
 def telling() -> int:
-    """Address of the system's function that tells which processor a thread has; 0 where there is none."""
+    """Address of the system's function that returns the processor of a thread; 0 without one."""
     return _address("GetCurrentProcessorNumber" if os.name == "nt" else "sched_getcpu")
 
 

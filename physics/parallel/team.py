@@ -16,7 +16,7 @@ __all__ = ["Team", "listed"]
 
 
 def listed(worlds: np.ndarray) -> np.ndarray:
-    """Worlds (n,) as a list (TAKEN_FIRST_WORLD + n,) int64 of those that a thread took."""
+    """List (TAKEN_FIRST_WORLD + n,) int64 of worlds (n,), in the form of a thread's taken worlds."""
     taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
     taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
     return taken

@@ -1,4 +1,4 @@
-"""A batch of worlds on a pool of threads, each with a range of worlds of its own."""
+"""Share a batch of worlds among a pool of threads, each with its own range of worlds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.parallel.bound_call import Work
 
 
 class Pool:
-    """Threads that share a batch evenly: what `thread_team.Team` is without atomics.
+    """Threads that share a batch evenly: `thread_team.Team` without atomics.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Pool:
         self._pid = -1
 
     def run(self, calls: Sequence[Work]) -> None:
-        """Make the calls, one per thread, of which the calling one is the first; raises what one of them raised."""
+        """Make the calls, one per thread, the first in the calling thread; raise the exception of one of them."""
         if self.size == 1:
             calls[0].perform()
             return

@@ -1,4 +1,4 @@
-"""A batch of worlds on threads: kernels release the GIL, so a thread pool is enough.
+"""Share a batch of worlds among threads: kernels release the GIL, so a thread pool is enough.
 
 The pool is made when first needed and belongs to one process: after a fork the child makes its own. There is no
 threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked. What the pool
@@ -43,7 +43,7 @@ SWITCH = "RIGID_ENV_THREADS"
 
 
 class Team:
-    """The threads that share a batch.
+    """Threads that share a batch.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ class Team:
         self._pid = -1
 
     def run(self, calls: Sequence[Work]) -> None:
-        """Make the calls, one per thread, of which the calling one is the first.
+        """Make the calls, one per thread, the first in the calling thread.
 
-        A call is left out if its thread has not begun when all worlds are taken: it lists no worlds then.
+        A call is skipped if its thread has not begun before all worlds are taken; its list of worlds is then empty.
         """
         if self.size == 1:
             if calls[0].perform():
@@ -143,12 +143,12 @@ class Team:
             )
 
     def _send_for_all(self) -> None:
-        """Have the threads of the pool take the places of those who are away."""
+        """Start pool threads for the members that are away."""
         for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WORKER_WAS_IDLE]):
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
-        """Run a thread of the pool; meanwhile the team is in use, and with it the prepared calls."""
+        """Run a member in a pool thread; meanwhile the team and its prepared calls stay alive."""
         self._serve(member, self._stay)
 
     def _let_go(self) -> None:
@@ -166,7 +166,7 @@ class Team:
 
 
 def _raise(calls: Sequence[Work]) -> None:
-    """Raise what one of the calls raised; the next time a call that is left out has raised nothing."""
+    """Raise the exception of one of the calls; clear all, so that a skipped call has none next time."""
     try:
         for call in calls:
             call.raise_again()
@@ -176,12 +176,12 @@ def _raise(calls: Sequence[Work]) -> None:
 
 
 def _pauses(seconds: float) -> int:
-    """Number of pauses that take so long."""
+    """Number of pauses in a time."""
     return int(seconds / _pause()) + 1
 
 
 @cache
 def _pause() -> float:
-    """Length of a pause [s], which differs from processor to processor: of the trial that was disturbed least."""
+    """Length of a pause [s] on this processor, from the least disturbed trial."""
     pause, count = compiled(spin_wait_workers.repeat_pause, (0,)), 1000
     return min(timeit.repeat(lambda: pause(count), number=1, repeat=7)) / count

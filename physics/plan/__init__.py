@@ -1,1 +1,1 @@
-"""Plans: what of the engine a scene needs, and at which accuracy."""
+"""Plans: the parts of the engine that a scene needs at an accuracy."""

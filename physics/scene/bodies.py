@@ -25,7 +25,7 @@ def _tuple(array: ArrayLike) -> Any:
 
 
 def check_name(name: str) -> None:
-    """Refuse a body's name that is no text, is empty, or holds characters that do not print or blanks around it."""
+    """Refuse a body's name that is no text or empty, or has unprintable characters or outer blanks."""
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable():
         raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
 
@@ -33,7 +33,7 @@ def check_name(name: str) -> None:
 if TYPE_CHECKING:
 
     class _Shape:
-        """Attributes that every shape has, as checkers see them."""
+        """Attributes of every shape, for type checkers."""
 
         kind: ClassVar[Shape]
         mass: float
@@ -106,7 +106,7 @@ class Body(_Shape):
         self._check_range()
 
     def _set_mass(self) -> None:
-        """The mass, from the density if that is given."""
+        """Set the mass, from the density if that is given."""
         if (self.mass is None) == (self.density is None):
             raise ValueError(
                 f"mass is {shown(self.mass)} and density is {shown(self.density)}; allowed is exactly one of the two: "
@@ -119,7 +119,7 @@ class Body(_Shape):
         self._set("mass", float(validation.positive(mass, (), "mass")))
 
     def _check_range(self) -> None:
-        """Refuse a mass or inertia whose inverse no float holds: what is divided by it would not be finite."""
+        """Refuse a mass or inertia whose inverse is not finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             moments = np.diagonal(self.inertia)
         inertia.check_range(np.array([self.mass]), moments[None])
@@ -327,8 +327,8 @@ class Ellipsoid(Body):
 class Hull(Body):
     """The convex hull of points, of uniform density: a wedge, a prism, a rock.
 
-    `pos` is the centre of mass, as of every body: the hull is shifted there. Where that is in the frame of the points
-    says `centroid`, so that a body whose points stand where it is to be in the world has ``pos=hull.centroid``.
+    `pos` is the centre of mass, as for every body: the hull is shifted there. `centroid` is the centre of mass in the
+    frame of the points. So a hull whose points are given in the world has ``pos=hull.centroid``.
 
     Parameters
     ----------
@@ -375,7 +375,7 @@ class Hull(Body):
 
     @property
     def polyhedron(self) -> Polyhedron:
-        """Corners, faces and edges about the centre of mass, in the body frame; the same object for equal points."""
+        """Corners, faces and edges about the centre of mass, in the body frame; equal points share one object."""
         return convex_hull(self.points)
 
     @property
@@ -395,9 +395,9 @@ class Hull(Body):
 
     @property
     def dimensions(self) -> NDArray[np.float64]:
-        """(3,) how far the hull reaches from the centre of mass along each body axis, either way [m]."""
+        """Largest distance (3,) of the hull from the centre of mass along each body axis, in either direction [m]."""
         return np.abs(self.polyhedron.vertices).max(axis=0)
 
     def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not change it."""
+        """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not matter."""
         return np.full(np.shape(dimensions)[:-1], self.polyhedron.radius)

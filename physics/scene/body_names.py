@@ -1,4 +1,4 @@
-"""Names of bodies: from a name to an index, and from an index to what a user reads."""
+"""Names of bodies: conversion to indices, and labels for messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.summary import shown
 
 
 def body_index(value, field: str, scene: Scene, verb: str = "is") -> int:
-    """Index of a body of a scene, from its name or itself.
+    """Index of a body of a scene, given by its name or index.
 
     Raises
     ------

@@ -28,7 +28,7 @@ def block_in_box(
     walls: Layout = "three",
     **start: Any,
 ) -> Scene:
-    """The block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
+    """Make the block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
     layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
     if walls not in layouts:
         raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
@@ -183,12 +183,12 @@ SCENES["incline"] = _steep_incline
 
 
 def about(name: str) -> str:
-    """One line about a canonical scene."""
+    """Description of a canonical scene in one line."""
     return (SCENES[name].__doc__ or name).splitlines()[0].rstrip(".")
 
 
 def by_name(name: str) -> Scene:
-    """The canonical scene of this name."""
+    """Canonical scene of this name."""
     if name not in SCENES:
         raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, sorted(SCENES)))}")
     return SCENES[name]()

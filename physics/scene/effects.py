@@ -1,7 +1,7 @@
 """Effects of a scene: one small frozen dataclass each.
 
-A scene declares its effects; what it does not declare is not compiled into its
-kernel. The gyroscopic torque declares itself where a body's moments differ.
+A scene declares its effects. Kernels do not contain effects that it does not declare.
+The gyroscopic torque is on automatically where a body's moments of inertia differ.
 Force fields (drag, springs, your own) stand in `physics.scene.force_fields`.
 """
 
@@ -55,19 +55,19 @@ class Contact(Effect):
     restitution : float, optional
         Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times that before. None:
         impacts are plastic and the kernel holds no restitution. Where bodies have coefficients of their own
-        (`World.set_parameters`), two that meet have the larger one, and a wall has the body's.
+        (`World.set_parameters`), a pair takes the larger one, and a wall the body's.
     between_bodies : bool, optional
         False: bodies meet walls only, and pass through each other.
     tangential : float, optional
-        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993): the point of contact leaves an impact
-        with -e_t times its tangential velocity, as far as `Friction` holds it. 1: a superball; 0: it sticks; -1: it
-        slides on. None: as 0, and nothing of it is compiled.
+        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993). The point of contact leaves an impact
+        with -e_t times its tangential velocity, as far as the cone of `Friction` allows. 1: a superball; 0: it sticks;
+        -1: it slides on. None: like 0, and not compiled.
     stiffness : float, optional
-        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall, which pushes
-        with k times the depth [N/m]; greater than 0. It bounces without a restitution. None: rigid.
+        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall [N/m]; greater
+        than 0. It pushes with k times the depth, and bounces without a restitution. None: rigid.
     damping : float, optional
-        c of a damper beside it [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model, without
-        adhesion).
+        c of a damper beside the spring [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model,
+        without adhesion).
     """
 
     restitution: float | None = None
@@ -115,10 +115,10 @@ class Friction(Effect):
     ----------
     coefficient : float or (2,) array_like
         μ, the same for sticking and sliding; at least 0. Where bodies have coefficients of their own
-        (`World.set_parameters`), two that touch have the geometric mean, and a wall has the body's. Two coefficients,
-        greater than 0: μ1 along `axis` and μ2 across it, of walls with a grain. Their tangential forces fill the
-        ellipse (f1/μ1)² + (f2/μ2)² <= f_n², and what slides is opposed by the one that dissipates most (Goyal, Ruina
-        and Papadopoulos 1991).
+        (`World.set_parameters`), a pair takes the geometric mean, and a wall the body's. Two coefficients, greater
+        than 0, are those of walls with a grain: μ1 along `axis` and μ2 across it. Their tangential forces fill the
+        ellipse (f1/μ1)² + (f2/μ2)² <= f_n². Of these the one that dissipates most opposes a slide (Goyal, Ruina and
+        Papadopoulos 1991).
     axis : (3,) or (walls, 3) array_like, optional
         Direction of μ1, world frame, for all walls or one for each; its part along the wall counts. Needed with two
         coefficients, and only then.
@@ -195,7 +195,7 @@ class RollingFriction(_Resistance):
     Parameters
     ----------
     radius : float
-        By how much the normal force is ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
+        Distance of the normal force ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
     """
 
     radius: float = 0.001
@@ -228,7 +228,7 @@ class Actuator(Effect):
     limit_force, limit_torque : float, optional
         A longer force or torque is shortened to this, its direction kept [N, N m]; more than 0. None: no limit.
     lag : float
-        Time constant τ of what follows, ``τ dw/dt = command - w`` [s]; at least 0. 0: at once.
+        Time constant τ of the acting wrench w, ``τ dw/dt = command - w`` [s]; at least 0. 0: at once.
     delay : float
         Time after which a command arrives [s]; at least 0.
     """
@@ -251,7 +251,7 @@ class Actuator(Effect):
 
     @property
     def remembers(self) -> bool:
-        """True if what it gives depends on earlier commands."""
+        """True if the acting wrench depends on earlier commands."""
         return self.lag > 0.0 or self.delay > 0.0
 
 
@@ -260,18 +260,19 @@ class Actuator(Effect):
 class Sleeping(Effect):
     """Bodies at rest are left out of the step until something changes that acts on them.
 
-    What has gone no way in two windows of time in a row, and not ever further, sleeps with all that it touches, is near
-    to or is tied to: it keeps its place to the last bit, has no velocity, and costs next to nothing. Another wrench,
-    something awake that comes near, or a change from outside (`World.set_state`, `World.set_parameters`) wakes it.
+    A group of bodies sleeps once every displacement stays below the threshold for two windows of time, and at most
+    doubles from one to the next. A group are bodies that touch, are near to or are tied to each other. A sleeping body
+    keeps its place to the last bit, has no velocity, and costs next to nothing. It wakes when its wrench changes, when
+    an awake body comes near, or when a user changes the world (`World.set_state`, `World.set_parameters`).
 
     Parameters
     ----------
     slops : float
-        Way of any point of a body in a window that counts as none, in `Accuracy.slop` of its bounding radius; more than
-        0.
+        Threshold of the displacement of any point of a body in a window, in units of `Accuracy.slop` times its bounding
+        radius; more than 0.
     time : float, optional
         Length of a window [s]; more than 0. None: √(2 r/a), the time in which the body would fall its bounding radius r
-        at the acceleration a that it would have without contact; without any it does not sleep.
+        at the acceleration a that it would have without contact. A body without such an acceleration does not sleep.
     """
 
     slops: float = 4.0

@@ -1,4 +1,4 @@
-"""Checks of a user's field before anything moves: its class, its numbers, and all that its functions read.
+"""Checks of a user's field before a step: its class, its numbers, and all that its functions read.
 
 A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it
 is called with later, so that nothing is compiled twice; what Numba made of it is then looked through.
@@ -31,7 +31,7 @@ ENERGY = "one number: potential energy [J]"
 
 
 def check_class(kind: type, base: type) -> None:
-    """Refuse a class with values that `columns` would not find: one that was to be a dataclass, and is none.
+    """Refuse a class with values that `columns` would miss: one that lacks the decorator of a dataclass.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def check_class(kind: type, base: type) -> None:
 
 
 def numbers_in(effect, name: str) -> np.ndarray:
-    """A field of a dataclass as float64 (n,), all finite; ValueError if it holds something else."""
+    """Field of a dataclass as float64 (n,), all finite; ValueError otherwise."""
     value, what = getattr(effect, name), f"{type(effect).__name__}.{name}"
     try:
         return validation.finite(value, np.shape(value), what).ravel()
@@ -68,7 +68,7 @@ def numbers_in(effect, name: str) -> np.ndarray:
 
 
 def numbers_of(effect, body: int, worlds: np.ndarray) -> np.ndarray:
-    """`effect.columns(body, worlds)` as float64 (n,) or (k, n), all finite; ValueError if it is something else."""
+    """Numbers of `effect.columns(body, worlds)` as float64 (n,) or (k, n), all finite; ValueError otherwise."""
     name, found = f"{type(effect).__name__}.columns", effect.columns(body, worlds)
     try:
         numbers = np.asarray(found, dtype=np.float64)
@@ -80,7 +80,7 @@ def numbers_of(effect, body: int, worlds: np.ndarray) -> np.ndarray:
 
 
 def check_function(name: str, function: Callable, form: str, size: int, numbers: str) -> bool:
-    """Check a user's function for the arguments it will be called with; whether a call of it may raise an exception.
+    """Check a user's function for the types of its arguments; return whether a call may raise an exception.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Digest that tells a user's function from others, and from itself before an edit; and its machine code now."""
+"""Digest that identifies a version of a user's function, and its compiled form of that version."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from physics.kernels.compile.decorators import backend, is_compiled, plain_funct
 
 
 def digest(*functions: Callable | None) -> str:
-    """Hexadecimal digest of everything that decides what these functions compile to.
+    """Hexadecimal digest of everything that decides the machine code of these functions.
 
-    Their code, the numbers and functions that they read from around them, and so on down; of other modules that they
-    name the source.
+    The digest covers their code, and the numbers and functions that they read from around them, recursively. Of other
+    modules that they name it covers the source.
     """
     found = hashlib.sha256()
     seen: set[int] = set()
@@ -66,7 +66,7 @@ def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
 
 
 def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
-    """A compiled function and all those that it names, and so on down; not what it takes from modules."""
+    """A compiled function and all functions that it names, recursively; functions of modules are left out."""
     seen = set() if seen is None else seen
     if function in seen:
         return
@@ -79,9 +79,9 @@ def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
 
 
 def as_it_is(function: Callable) -> Callable:
-    """The same function for which nothing is compiled of before an edit of what it reads; the same one until the next.
+    """Function without machine code from before an edit of the globals that it reads.
 
-    Numba takes the numbers and functions that a function reads when it compiles it, and never again.
+    Numba reads the numbers and functions around a function when it compiles it, and never again.
     """
     key = plain_function(function), digest(function)
     if key not in _AS_IT_IS:

@@ -49,7 +49,7 @@ _KNOWN = (
 
 
 class Place(NamedTuple):
-    """A line of a user's file, and the function that it is in."""
+    """Line of a user's file, and its function."""
 
     file: str
     line: int
@@ -62,13 +62,13 @@ class Place(NamedTuple):
 
 
 def at(function: Callable, line: tuple[str, int] | None = None) -> Place:
-    """The place of a statement of a function, of its file and line; without them that of its first line."""
+    """Place of a statement of a function, by file and line; without them that of its first line."""
     plain = plain_function(function)
     return Place(*(line or (plain.__code__.co_filename, plain.__code__.co_firstlineno)), plain.__name__)
 
 
 def placed(what: str, place: Place) -> str:
-    """A message with the place that it is about."""
+    """Add a place to a message."""
     return f"{what}\n{place}"
 
 
@@ -117,7 +117,7 @@ def _holds(function: Callable, file: str, line: int) -> bool:
 
 
 def raised(error: Exception, slots: tuple) -> Exception:
-    """Return the error that a compiled function raised, with the class of its field; only an IndexError is reworded.
+    """Make the error of an exception in a compiled function, with its field's class; only an IndexError is reworded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Force fields as effects, and compiling and keeping a user's own one.
+"""Base class of force fields, and the compilation of a user's own ones.
 
 A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
 parameters and the time. The built-in ones stand in `physics.scene.force_fields`; your own needs nothing beyond these::
@@ -78,7 +78,7 @@ class Field(Effect):
 
     @property
     def kind(self) -> type[Field]:
-        """Class whose functions are compiled for it: its own."""
+        """Class whose functions are compiled for the field: its own."""
         return type(self)
 
     def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -103,30 +103,30 @@ class Field(Effect):
         return np.concatenate(numbers) if numbers else np.empty(0)
 
     def check(self, body_count: int) -> None:
-        """Raise a ValueError where the field does not fit a scene of so many bodies."""
+        """Raise a ValueError if the field does not fit a scene of so many bodies."""
 
     @property
     def takes_energy(self) -> bool | None:
-        """True if it only ever takes mechanical energy (True), keeps it, its own included (False), or neither."""
+        """True if the field only removes mechanical energy, False if it conserves it with its own, else None."""
         return None
 
     @property
     def is_steady(self) -> bool:
-        """True if what it does to a body that does not move stays the same; not known of fields of your own.
+        """True if the field's effect on a resting body is constant in time; unknown for a user's own fields.
 
-        `Sleeping` needs to know: under a load that may change on its own nothing sleeps.
+        `Sleeping` needs this: under a load that may change on its own nothing sleeps.
         """
         return False
 
     @property
     def label(self) -> str:
-        """Name in a plan: of the class, in words."""
+        """Name in a plan: the class in words."""
         name = type(self).__name__
         return "".join(f" {c.lower()}" if c.isupper() and k else c.lower() for k, c in enumerate(name))
 
 
 class Checked(Field):
-    """A built-in field: it sets checked values on a frozen dataclass."""
+    """Built-in field, which sets checked values on a frozen dataclass."""
 
     @property
     def is_steady(self) -> bool:
@@ -139,7 +139,7 @@ class Checked(Field):
 
 @dataclass(frozen=True)
 class FieldSlot:
-    """A kind of field in a scene: its term in the kernel, and which of the scene's effects it stands for.
+    """A kind of field in a scene: its term in the kernel, and the scene's effects of that kind.
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class FieldSlot:
 
 
 def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...]:
-    """The fields among a scene's effects, by kind; the order in which they were declared does not matter.
+    """Fields among a scene's effects, by kind; the order of declaration does not matter.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def _column_count(kind: type[Field], found: list[Field], body_count: int) -> int
 
 
 def _check_functions(kind: type[Field], term: Term) -> bool:
-    """Check a user's functions; whether the one that a step calls may raise an exception."""
+    """Check a user's functions; return whether the function of a step may raise an exception."""
     numbers = field_check.describe(kind, Field, term.size)
     form = field_check.AIR if kind.is_air else field_check.LOAD
     if term.energy is not None:
@@ -220,7 +220,7 @@ def _compiled(kind: type[Field], name: str) -> Any:
 
 
 def _name(kind: type[Field]) -> str:
-    """Return the name that tells this kind of field from all others: its function's, for a user's own with a digest."""
+    """Name that identifies this kind of field: its function's, with a digest for a user's own."""
     function = _compiled(kind, "function")
     name = plain_function(function).__name__.replace("_", "")
     if _is_built_in(function):

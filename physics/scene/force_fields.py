@@ -1,4 +1,4 @@
-"""The built-in force fields: one small frozen dataclass per effect. Sources and formulas stand with their functions."""
+"""Built-in force fields: one small frozen dataclass per effect. Sources and formulas stand with their functions."""
 
 from __future__ import annotations
 

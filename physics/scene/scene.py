@@ -37,13 +37,13 @@ EffectType = TypeVar("EffectType")
 
 
 class SceneWarning(UserWarning):
-    """A scene that is valid, but in which something that it declares does nothing."""
+    """Warning about a valid scene in which a declaration has no effect."""
 
 
 @known_keywords
 @dataclass(frozen=True)
 class HalfSpace:
-    """The region {x : normal·x >= offset} that bodies may be in.
+    """Half-space {x : normal·x >= offset} that bodies may be in.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ class Scene:
         )
 
     def _expression(self) -> str:
-        """Expression that makes the scene again; none where it fills a screen."""
+        """Expression that makes the scene again; none if it would fill a screen."""
         if len(self.bodies) + len(self.walls) + len(self.effects) > MOST_SHOWN:
             return ""
         text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
@@ -232,7 +232,7 @@ def _items(given: Any, name: str, allowed: Any) -> tuple:
 
 
 def _frames_of_package() -> int:
-    """The `stacklevel` with which whoever calls this warns of the line outside this package that led here."""
+    """`stacklevel` of a warning that names the line outside this package that led here."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):
         level, frame = level + 1, frame.f_back

@@ -103,7 +103,7 @@ class Spring(Checked):
         return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
 
     def _linked_columns(self, body: int) -> NDArray[np.float64]:
-        """Columns of one end of a spring between bodies, or of a body at neither."""
+        """Columns of one end of a spring between bodies, or of a body that is at neither end."""
         ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
         here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
         columns = np.zeros(implicit_two_body_spring.LINK_SIZE)

@@ -22,10 +22,11 @@ FLAT_ORDER = 0.5
 
 
 def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -> list[int]:
-    """Indices of the points that no other one beats, quickest first.
+    """Indices of the points that no other point beats, quickest first.
 
     A point is on the front if every quicker one has a larger error. Errors at or below `floor`, the truth's own error,
-    cannot be told apart and count as equal to it: the quickest of them is on the front. What is not finite never is.
+    cannot be told apart and count as equal to it: the quickest of them is on the front. Points that are not finite
+    never are.
     """
     found, best = [], math.inf
     order = sorted(range(len(errors)), key=lambda i: (costs[i], errors[i]))
@@ -38,11 +39,11 @@ def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -
 
 
 def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Indices of the smallest steps over which the error no longer falls, finest first; empty while it still does.
+    """Indices of the smallest steps over which the error no longer falls, finest first; empty while it still falls.
 
-    From the finest step on towards coarser ones, as long as the coarser one's error is not larger than the finer one's
-    by more than the `FLAT_ORDER`-th power of their ratio. A single step is no tail. A mere lucky value in the middle
-    is none either: the finer steps after it fall again.
+    The tail grows from the finest step towards coarser ones, while the coarser one's error is at most the finer one's
+    times the `FLAT_ORDER`-th power of the ratio of the steps. A single step is no tail. A lucky value in the middle is
+    none either: the finer steps after it fall again.
     """
     order = [i for i in np.argsort(steps, kind="stable") if math.isfinite(errors[i])]
     tail = order[:1]
@@ -54,7 +55,7 @@ def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 
 def plateau(steps: Sequence[float], errors: Sequence[float]) -> float | None:
-    """Smallest error of the `flat_tail`: below it, smaller steps do not come. None while the error still falls."""
+    """Smallest error of the `flat_tail`, which smaller steps do not improve. None while the error still falls."""
     tail = flat_tail(steps, errors)
     return min(errors[i] for i in tail) if tail else None
 
@@ -90,7 +91,7 @@ def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def lost_from(steps: Sequence[float], is_lost: Sequence[bool]) -> float | None:
-    """Smallest step from which on every larger one is lost; None where the largest is not."""
+    """Smallest step from which on every larger one is lost; None if the largest is not lost."""
     found = None
     for i in sorted(range(len(steps)), key=lambda i: -steps[i]):
         if not is_lost[i]:

@@ -18,7 +18,7 @@ OURS = "rigid-env"
 
 
 class TooSlow(Exception):
-    """A contender takes longer than its measurement is worth; the message says how long."""
+    """Error of a contender that takes too long for its measurement; the message says how long."""
 
 
 class Contender(Protocol):
@@ -45,7 +45,7 @@ class Contender(Protocol):
         """
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Two functions: one goes back to the start, the other, which is timed, takes `steps` steps from there."""
+        """Two functions: the first returns to the start; the second, which is timed, takes `steps` steps from there."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class EngineContender:
 
     @property
     def setting(self) -> str:
-        """Name of the preset, or what is different from ``balanced``."""
+        """Name of the preset, or the differences from ``balanced``."""
         return setting_name(self.accuracy)
 
     def watch(self, steps: int) -> Trajectory:
@@ -82,7 +82,7 @@ class EngineContender:
 
 
 def setting_name(accuracy: Preset | Accuracy) -> str:
-    """A preset's name, or the nearest preset's with the knobs that differ: ``balanced(substeps=5)``."""
+    """Name of a preset, or of the nearest preset with the settings that differ: ``balanced(substeps=5)``."""
     knobs = resolve(accuracy)
     changes = {
         name: [f.name for f in fields(knobs) if getattr(knobs, f.name) != getattr(preset, f.name)]

@@ -1,4 +1,4 @@
-"""Errors of a trajectory against another one, and against the laws: plain NumPy, the same for every engine."""
+"""Errors of a trajectory against another one, and against laws: plain NumPy, the same for every engine."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
 def root_mean_square(difference: np.ndarray) -> float:
     """Root of the mean over the samples of |difference|² of the worst body; `difference` is (samples, bodies, 3).
 
-    Velocities are compared in the mean: an impact that comes a moment early makes an error as large as the impact
-    itself between the two moments, however short that is.
+    Velocities are compared in the mean. An impact a moment early makes an error as large as the impact between the two
+    moments, however close they are.
     """
     return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
 
@@ -65,7 +65,7 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """True if nothing in the scene takes energy: no contact, or elastic contact without friction; no drag."""
+    """True if no energy leaves the scene: no contact, or elastic contact without friction; no drag."""
     if any(law is not False for law in _field_laws(scene)):
         return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)
@@ -81,10 +81,11 @@ def _field_laws(scene: Scene) -> list[bool | None]:
 
 
 def energy_error(scene: Scene, energy: np.ndarray) -> float:
-    """By how much the energy [J], (samples, bodies), breaks its law; bodies do not exchange any.
+    """Violation of the energy's law by the energy [J] (samples, bodies); bodies must not exchange energy.
 
-    Where it is conserved: the largest departure from the start. Else: the largest rise above an earlier value, which
-    nothing passive has; what the right losses are only a truth can tell. Not a number where a field may give energy.
+    For conserved energy this is the largest departure from the start. Else it is the largest rise above an earlier
+    value, which a passive scene never has; only a truth can tell the right losses. Not a number where a field may give
+    energy.
     """
     if None in _field_laws(scene):
         return float("nan")
@@ -119,10 +120,10 @@ def _support(body: Body, direction: np.ndarray) -> np.ndarray:
 
 
 def event_error(events: Sequence, true: Sequence) -> float | None:
-    """Worst difference of the times of the same events [s]; None where none can be told to be the same.
+    """Worst difference of the times of the same events [s]; None if no events can be matched.
 
-    Events are paired by kind, in order of time, and only those kinds count of which both have equally many: with one
-    more or less of them, which belongs to which would be a guess. A fault is no event of the scene.
+    Events are paired by kind, in order of time. A kind counts only if both runs have equally many events of it;
+    otherwise a pairing would be a guess. A fault is no event of the scene.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def styles_of(frontiers: Sequence[Frontier]) -> dict[str, Style]:
 def draw_panel(
     panel, frontier: Frontier, styles: Mapping[str, Style], title: str, about: str = "", goals: Goals = ()
 ) -> None:
-    """Draw a frontier.
+    """Draw the points of a frontier into a panel.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
 
 
 def _draw_regions(panel, frontier: Frontier, goals: Goals, zero: float) -> None:
-    """The Pareto front as stairs up to the edges, and where a point must lie to reach a goal; last, as limits stay."""
+    """Draw the Pareto front as stairs, and the region that reaches a goal; called last, so that the limits stay."""
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
     front = frontier.front()
     if front:

@@ -78,7 +78,7 @@ class Frontier:
     duration : float
         Simulated time [s].
     is_complete : bool
-        False: interrupted; what is here is what was done.
+        False: interrupted; the points are those measured until then.
     skipped : tuple of str
         Who was left out, and why.
     """
@@ -95,20 +95,20 @@ class Frontier:
     # --- points ------------------------------------------------------------------------------------------------
 
     def error(self, point: FrontierPoint, measure: str | None = None) -> float:
-        """A point's error in a measure; infinite where it could not be taken or is not a number."""
+        """Error of a point in a measure; infinite if it is missing or not a number."""
         value = point.errors.get(self._measure(measure), math.inf)
         return value if not math.isnan(value) else math.inf
 
     def own_error(self, measure: str | None = None) -> float:
-        """The truth's own error in a measure; 0 where the measure needs no truth (energy, penetration)."""
+        """Own error of the truth in a measure; 0 if the measure needs no truth (energy, penetration)."""
         return float(self.floors.get(self._measure(measure), 0.0))
 
     def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:
-        """True if a point is as good as the truth itself is known; it may be better than it looks."""
+        """True if a point's error is at most the truth's own error; its real error is unknown."""
         return self.error(point, measure) <= self.own_error(measure)
 
     def of(self, setting: object = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:
-        """The points of a setting (a name, or an `Accuracy`) and an engine, coarsest step first; None: of all.
+        """Points of a setting (a name, or an `Accuracy`) and an engine, coarsest step first; None: of all.
 
         Raises
         ------
@@ -133,7 +133,7 @@ class Frontier:
     # --- answers -----------------------------------------------------------------------------------------------
 
     def cheapest(self, error: float, measure: str | None = None, engine: str | None = None) -> FrontierPoint | None:
-        """The quickest setting whose error is at most `error`; None where none was shown to be (see `advice`).
+        """Quickest setting whose error is at most `error`; None if none was shown to be (see `advice`).
 
         The truth's own error counts: below it, nothing can be shown.
         """
@@ -142,7 +142,7 @@ class Frontier:
         return good[0] if good else None
 
     def advice(self, error: float, measure: str | None = None, engine: str | None = None) -> str:
-        """`cheapest` as a sentence, which also says why there is none."""
+        """`cheapest` as a sentence, with the reason if there is none."""
         point, unit = self.cheapest(error, measure, engine), self.units[self._measure(measure)]
         goal = f"{error:g} {unit}".rstrip()
         if point is not None:
@@ -156,26 +156,26 @@ class Frontier:
         return f"below {goal}: no setting that was measured; the best is {front[-1]}, error {best:.2g}"
 
     def order(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
-        """Observed order of a setting: slope of log error over log step where the error falls; None: not to be seen."""
+        """Observed order of a setting: slope of log error over log step where the error falls; None if none shows."""
         some = [p for p in self.of(setting, engine) if not p.is_lost]
         errors = [self.error(p, measure) for p in some]
         return frontier_analysis.observed_order([p.dt for p in some], errors, self.own_error(measure))
 
     def plateau(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
-        """Error below which smaller steps of a setting do not get; None while its error still falls.
+        """Error that smaller steps of a setting do not improve; None while its error still falls.
 
-        Rounding where the setting converges, its tolerances where they are coarser, or its model.
+        Its cause is rounding if the setting converges, its tolerances if they are coarser, or its model.
         """
         some = [p for p in self.of(setting, engine) if not p.is_lost]
         return frontier_analysis.plateau([p.dt for p in some], [self.error(p, measure) for p in some])
 
     def lost_from(self, setting: object, engine: str = OURS) -> float | None:
-        """Smallest step [s] from which on a setting is lost at every larger one; None where it never is."""
+        """Smallest step [s] from which on a setting is lost at every larger one; None if it never is."""
         some = self.of(setting, engine)
         return frontier_analysis.lost_from([p.dt for p in some], [p.is_lost for p in some])
 
     def families(self) -> tuple[tuple[str, str], ...]:
-        """Every (engine, setting) that was measured, in that order."""
+        """Every measured (engine, setting), in that order."""
         return tuple(dict.fromkeys((p.engine, p.setting) for p in self.points))
 
     __repr__ = parts_repr
@@ -211,7 +211,7 @@ class Frontier:
         return plot_frontier(self, path)
 
     def to_dict(self) -> dict:
-        """For JSON: what is not finite is None."""
+        """Frontier ready for JSON; numbers that are not finite are None."""
         front = self.front()
         rows = [
             {

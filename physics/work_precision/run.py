@@ -53,7 +53,7 @@ def ladder(
 ) -> list[tuple[Preset | Accuracy, float]]:
     """Every accuracy at every step [s]: the `settings` of `frontier`.
 
-    Without `steps`: at `STEPS`, and what is event-driven at `COARSE_STEPS`, too.
+    Without `steps` the steps are `STEPS`, and for event-driven settings also `COARSE_STEPS`.
     """
     if isinstance(accuracies, (str, Accuracy)) or not isinstance(accuracies, Iterable):
         raise ValueError(f"accuracies is {shown(accuracies)}; allowed is a list of presets and physics.Accuracy(...)")
@@ -81,10 +81,10 @@ def frontier(
     repeats: int = REPEATS,
     progress: Progress | None = None,
 ) -> Frontier:
-    """Show what accuracy costs in time, for one scene.
+    """Measure error against time for one scene.
 
     Every setting is run, compared with the truth and timed on one thread, in turns with the others. An interruption
-    (Ctrl-C) ends the measurement, not the program: what was done by then is returned.
+    (Ctrl-C) ends the measurement, not the program: the results until then are returned.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def measure(
 
 
 class _Turn:
-    """One contender: its errors, and the times of its runs so far."""
+    """Errors of one contender, and the times of its runs so far."""
 
     def __init__(self, contender: Contender, scene: Scene, truth: Truth | ReferenceTruth, duration: float):
         self.contender, self.steps = contender, round(duration / contender.dt)
@@ -196,19 +196,19 @@ class _Turn:
         return total / runs
 
     def time(self) -> None:
-        """One more repeat, unless those so far took too long."""
+        """Run once more, unless the runs so far took too long."""
         if sum(self.seconds) * self.runs < BUDGET:
             self.seconds.append(self._seconds(self.runs))
 
     def point(self) -> FrontierPoint:
-        """Return the measured point; a contender that was never timed has its warm-up's time."""
+        """Measured point; a contender without timed runs has its warm-up's time."""
         c, simulated = self.contender, self.steps * self.contender.dt
         costs = tuple(value / simulated for value in self.seconds or [self.first])
         return FrontierPoint(c.engine, c.setting, c.dt, self.errors, costs, self.is_lost, self.note)
 
 
 def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]:
-    """(duration, sample_dt) [s]: the shortest time that is a whole multiple of every step, and what of `duration` is.
+    """(duration, sample_dt) [s]: `sample_dt` is the shortest multiple of all steps, `duration` a multiple of it.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]
 
 
 def _pairs(settings: Iterable) -> dict[str, tuple]:
-    """The settings by what messages call them."""
+    """Settings with their names in messages."""
     if isinstance(settings, (str, Accuracy)) or not isinstance(settings, Iterable):
         raise ValueError(f"settings is {shown(settings)}; allowed is a list of (preset or physics.Accuracy, step in s)")
     pairs = list(settings)
@@ -275,7 +275,7 @@ def _name(contender: Contender) -> str:
 
 
 class _Counter:
-    """Tells a progress callback how many runs are behind."""
+    """Counter that tells a progress callback the number of finished runs."""
 
     def __init__(self, progress: Progress | None, total: int):
         self.progress, self.total, self.done = progress, total, 0

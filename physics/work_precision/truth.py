@@ -1,4 +1,4 @@
-"""Truth for a trajectory: one that the caller knows, or our own reference at two settings."""
+"""Truth for a trajectory: one of the caller, or our own reference at two settings."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ SAME_TIME = 1e-6
 @known_keywords
 @dataclass(frozen=True)
 class Truth:
-    """An outcome that the caller knows.
+    """Outcome known to the caller.
 
     Parameters
     ----------
@@ -94,10 +94,11 @@ class Truth:
 
 
 class ReferenceTruth:
-    """The preset ``reference``, and how well it agrees with itself.
+    """Truth by the preset ``reference``, and its agreement with itself.
 
     Two runs: one at half the finest step of the ladder, one at the finest step and with tolerances ten times as large.
-    The first is the truth, the difference its own stated error: what a setting does better than that cannot be seen.
+    The first is the truth, the difference its own stated error: a setting that is better than that cannot be told
+    apart.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ class ReferenceTruth:
 
     @cached_property
     def true(self) -> Trajectory:
-        """The run that counts as the truth."""
+        """Run that counts as the truth."""
         return simulate(self.scene, self.duration, self.best, sample_dt=0.5 * self.dt)
 
     @cached_property
@@ -148,7 +149,7 @@ class ReferenceTruth:
         return f"reference at {500 * self.dt:g} ms, against itself at {1e3 * self.dt:g} ms with looser tolerances"
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:
-        """Errors of a trajectory at the times that are compared.
+        """Errors of a trajectory at the times of the comparison.
 
         Returns
         -------

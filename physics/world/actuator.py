@@ -1,4 +1,4 @@
-"""From the commanded wrench to the wrench that acts: the actuator of a world, before its kernel.
+"""Actuator of a world: it turns the commanded wrench into the acting one, before the kernel.
 
 A command is held over a step. Delayed, it is a staircase whose treads begin `delay` after the steps in which it was
 given; each tread is clipped. Behind it stands the lag τ w' = c - w, which over a tread of length h with command c takes
@@ -66,7 +66,7 @@ class Actuation:
         return np.zeros((self._shape[0] * self._shape[1], 6))
 
     def advance(self, world: Batch, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """`World.advance` through the actuator: one that remembers is asked at each step."""
+        """Make `World.advance` through the actuator; one with a memory is called at each step."""
         if steps == 1 or not self.actuator.remembers:
             self.take(wrench, dt)
             world.make(calls, steps * dt)
@@ -80,7 +80,7 @@ class Actuation:
 
     @contextmanager
     def passed_by(self, load: np.ndarray | None) -> Iterator[None]:
-        """Let a load (worlds, bodies, 6) act in the steps of the block besides what the actuator gives."""
+        """Add a load (worlds, bodies, 6) past the actuator in the steps of the block."""
         self.past = load
         try:
             yield
@@ -88,7 +88,7 @@ class Actuation:
             self.past = None
 
     def take(self, wrench: np.ndarray, dt: float) -> None:
-        """Take the command of a step of `dt` [s]; `applied` is then what acts in it."""
+        """Take the command of a step of `dt` [s]; `applied` is then the acting wrench."""
         if self.actuator.delay > 0.0:
             self._command = self._nothing()
         self._command[...] = wrench.reshape(-1, 6)
@@ -106,7 +106,7 @@ class Actuation:
             self.applied += self.past
 
     def _treads(self, dt: float) -> list[tuple[float, np.ndarray]]:
-        """(share of the step, command) of the staircase over a step of `dt`; zero before the first command."""
+        """Staircase of commands over a step of `dt`: (share of the step, command); zero before the first command."""
         if self.actuator.delay == 0.0:
             return [(1.0, self._command)]
         late = [*self._late, (0.0, self._command)]
@@ -118,7 +118,7 @@ class Actuation:
         return [(end - begin, command) for (begin, end), command in zip(pairwise(edges), commands) if end > begin]
 
     def forget(self, worlds: np.ndarray) -> None:
-        """Let these worlds begin at rest: no output, no commands on their way."""
+        """Reset these worlds: no output, no commands on their way."""
         if len(worlds) == self._shape[0]:
             self._late = []
         for rows in (self.output, *(command for _, command in self._late)):
@@ -134,13 +134,13 @@ class Actuation:
         ]
 
     def put_back(self, kept: tuple) -> None:
-        """Go on from what `kept` gave of all worlds."""
+        """Restore a state from `kept` of all worlds."""
         output, late = kept
         self.output[...] = output
         self._late = [(age, command.copy()) for age, command in late]
 
     def put_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray) -> None:
-        """Let `worlds` (k,) go on as the worlds `source` (k,) of what `kept` gave.
+        """Restore `worlds` (k,) from the worlds `source` (k,) of a state from `kept`.
 
         Parameters
         ----------
@@ -162,17 +162,17 @@ class Actuation:
             self._late.append((age, command))
 
     def _rows(self, table: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6), copied."""
+        """Copied rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6)."""
         return table.reshape(-1, *self._shape[1:])[worlds]
 
 
 def _held(staircase: list[tuple[float, np.ndarray]], age: float) -> np.ndarray | None:
-    """The youngest command of a staircase that is at least as old as this [s]; None: there is none."""
+    """Youngest command of a staircase that is at least as old as this [s]; None without one."""
     return next((command for each, command in reversed(staircase) if each >= age), None)
 
 
 def _snapped(share: float) -> float:
-    """A share of a step, 0 or 1 where it is so but for rounding."""
+    """Share of a step, set to 0 or 1 where it is so to rounding."""
     for edge in (0.0, 1.0):
         if abs(share - edge) <= NO_TIME:
             return edge

@@ -1,4 +1,4 @@
-"""The arrays of a batch of worlds: what the parts of a `World` share, and nothing that they do with it."""
+"""Arrays of a batch of worlds, shared by the parts of a `World`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _KEPT, _KEPT_AWAKE = attrgetter(*KEPT), attrgetter(*KEPT[:-1])
 
 
 class ActuatorState(Protocol):
-    """The actuators of a batch between two steps; see `physics.world.actuator`."""
+    """Interface of a batch's actuators; see `physics.world.actuator`."""
 
     actuator: Actuator
     applied: np.ndarray
@@ -32,22 +32,22 @@ class ActuatorState(Protocol):
     past: np.ndarray | None
 
     def passed_by(self, load: np.ndarray | None) -> AbstractContextManager[None]:
-        """Let a load act besides in the steps of a block."""
+        """Add a load past the actuator in the steps of a block."""
 
     def kept(self, worlds: np.ndarray | None = None) -> Any:
-        """All that decides what acts from now on, of some worlds or all."""
+        """Copy all that decides the coming wrenches, of some worlds or all."""
 
     def put_back(self, kept: Any) -> None:
-        """As it was when `kept` was taken."""
+        """Restore the state when `kept` was taken."""
 
     def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
-        """Let worlds go on as those of `source` in `kept`."""
+        """Restore worlds from those of `source` in `kept`."""
 
     def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make steps with the wrench that the actuators let through."""
 
     def forget(self, worlds: np.ndarray) -> None:
-        """Forget all commands that these worlds were given."""
+        """Drop all commands that these worlds were given."""
 
 
 class Batch:
@@ -140,7 +140,7 @@ class Batch:
         def advance(self, calls: Any, wrench: np.ndarray, steps: int, dt: float) -> None: ...
 
     def make(self, calls: list[Work], duration: float) -> None:
-        """Make kernel calls that take so long [s]."""
+        """Make the kernel calls of a time [s]."""
         if self.plan.fields:
             for scratch in self.scratch:
                 body_records(scratch)["call_start"] = self.time
@@ -148,7 +148,7 @@ class Batch:
         self.time += duration
 
     def no_wrench(self) -> NDArray[np.float64]:
-        """(worlds, bodies, 6) float64 zeros: an array for wrenches."""
+        """Zeros (worlds, bodies, 6) float64 for wrenches."""
         return np.zeros((self.worlds, self.body_count, 6))
 
     def kept(self) -> tuple[np.ndarray, ...]:
@@ -156,13 +156,13 @@ class Batch:
         return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:
-        """Rows that one world has in each of the `kept` arrays; 0: it has one row for all worlds, which is not used."""
+        """Number of a world's rows in each of the `kept` arrays; 0 for an unused array with one row for all worlds."""
         bodies = self.body_count
         memory = self.plan.scheme.memory.rows_per_world(bodies) if self.plan.contact else 0
         return (bodies, bodies, 1, memory, 1, bodies) if self.plan.sleeping else (bodies, bodies, 1, memory, 1)
 
     def sleep_of_kernel(self) -> Sleep | None:
-        """Sleep record for the step; None where no body may sleep."""
+        """Sleep record for the step; None if no body may sleep."""
         if not self.plan.sleeping:
             return None
         effect: Any = self.scene.effect(Sleeping)

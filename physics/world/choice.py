@@ -1,4 +1,4 @@
-"""Worlds that a user names by their indices."""
+"""Choice of worlds by indices."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from physics.summary import shown
 
 
 def chosen(worlds, count: int, field: str = "worlds", once: bool = True) -> np.ndarray:
-    """Indices (k,) int64 of the worlds meant, of `count`; a mask of so many bools names them, too.
+    """Indices (k,) int64 of the chosen worlds of `count`; a mask of so many bools is allowed, too.
 
     Parameters
     ----------

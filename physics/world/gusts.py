@@ -1,4 +1,4 @@
-"""Gusts that begin anew in some worlds of a batch, which has one time, and whether a field changes with time at all."""
+"""Restart gusts in some worlds of a batch, whose time is common, and tell whether a field depends on time."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from physics.scene.force_fields import Wind
 from physics.world.batch import Batch
 
 PHASES = 3 * WIND_WAVES
-"""Of one wind."""
+"""Number of phases of one wind."""
 
 
 def reads_time(plan: Plan, params: np.ndarray) -> bool:
-    """True if a field may change with time: wind with gusts, or a user's that does not say that it is steady."""
+    """True if a field may change with time: wind with gusts, or a user's field that is not declared steady."""
     if any(slot.is_users and not all(effect.is_steady for effect in slot.effects) for slot in plan.fields):
         return True
     return any(params[:, first + WIND_GUST].any() for first in _winds(plan))
 
 
 def gust_phases(plan: Plan) -> int:
-    """Number of phases that decide the gusts of one world; 0: its winds are steady."""
+    """Number of phases that decide the gusts of one world; 0 if its winds are steady."""
     return PHASES * len(_winds(plan)) if any(_has_gusts(slot) for slot in plan.fields) else 0
 
 
 def begin_gusts(world: Batch, worlds: np.ndarray, shares: np.ndarray) -> None:
-    """Let gusts begin anew in some worlds, as they would at time 0 of a batch of their own.
+    """Restart gusts in some worlds, like those of a batch of their own at time 0.
 
     A wave cos(ω t + φ) gets the phase φ - ω t of the present time t. At t = 0 nothing is rounded; later the gusts are
     the same up to the rounding of ω t.

@@ -1,4 +1,4 @@
-"""Files of arrays with a head that says what they are: ``.npz``, of which nothing is run when they are read."""
+"""Files of arrays with a descriptive head: ``.npz`` files that run no code when they are read."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def is_count(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class FileKind:
-    """A kind of such files.
+    """A kind of headed file.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class FileKind:
     missing: str = ""
 
     def write(self, file: BinaryIO, head: Mapping[str, Any], parts: Mapping[str, np.ndarray]) -> None:
-        """Write a head, which JSON can hold, and arrays by name into an open file."""
+        """Write a JSON-able head and named arrays into an open file."""
         head = {"kind": self.kind, "format": self.format, **head}
         np.savez_compressed(file, head=json.dumps(head), **parts)
 

@@ -1,4 +1,4 @@
-"""Rows of physical parameters, as the kernels read them, from bodies and from per-world values."""
+"""Rows of physical parameters for the kernels, from bodies and from per-world values."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
 
 
 def _write_body(rows, body, masses, moments, R, dimensions) -> None:
-    """One body into its rows (n, PARAM_SIZE), but for the series; the other arrays have n rows, or one for all."""
+    """Write one body into its rows (n, PARAM_SIZE), without the series; the other arrays have n rows, or one."""
     rows[:, at.INV_MASS] = 1.0 / masses
     rows[:, at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
     rows[:, at.PRINCIPAL : at.PRINCIPAL + 4] = np.reshape([quaternion_of(frame) for frame in R], (-1, 4))
@@ -90,7 +90,7 @@ def _write_series(params: np.ndarray) -> None:
 
 @entry_kernel
 def _change_series(params):
-    """The same, compiled: worlds with bodies of their own change them at every reset."""
+    """Write the series, compiled: worlds with their own bodies change them at every reset."""
     first = at.INV_INERTIA
     for i in range(params.shape[0]):
         series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]
@@ -98,7 +98,7 @@ def _change_series(params):
 
 
 def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple[int, ...], str]:
-    """(array, shape, field) for `validation`: `value` with a missing worlds or bodies axis added."""
+    """Arguments (array, shape, field) for `validation`: `value` with a missing worlds or bodies axis added."""
     allowed = f"shape {shape}, or without the axis of bodies, or of worlds and bodies"
     array = validation.floats(value, field, f"are numbers in {allowed}")
     given = array.shape

@@ -15,7 +15,7 @@ from physics.scene.body_names import body_label
 
 
 class Solver(IntEnum):
-    """The strongest contact method that a step needed."""
+    """Strongest contact method that a step needed."""
 
     NONE = at.METHOD_NONE
     DIRECT = at.METHOD_DIRECT
@@ -106,7 +106,7 @@ def gravest(table, status):
 
 @kernel
 def add_rows(first, end, total, table):
-    """Add the reports of some worlds to those of steps before: counts add up, of the rest the largest."""
+    """Add the reports of some worlds to those of earlier steps: counts add up, other columns keep the largest."""
     for world in range(first, end):
         for c in range(at.REPORT_SIZE):
             if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FIRST_FAULTY):
@@ -117,7 +117,7 @@ def add_rows(first, end, total, table):
 
 @entry_kernel
 def add_report(total, table):
-    """Add a report `table` (worlds, REPORT_SIZE) to that of steps before (`add_rows`)."""
+    """Add a report `table` (worlds, REPORT_SIZE) to that of earlier steps (`add_rows`)."""
     add_rows(0, table.shape[0], total, table)
 
 
@@ -214,7 +214,7 @@ class StepReport:
 
     @property
     def status(self) -> NDArray[np.int64]:
-        """(worlds,) int64, values of `Status`: the gravest thing that happened."""
+        """Gravest outcome of the step, (worlds,) int64, values of `Status`."""
         status = np.empty(len(self._table), dtype=np.int64)
         gravest(self._table, status)
         return status

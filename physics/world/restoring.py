@@ -1,4 +1,4 @@
-"""Snapshots of a batch, and worlds that go on from one: from other places, and in batches of other sizes, too."""
+"""Take snapshots of a batch, and restore worlds from them, into other worlds and batches of other sizes, too."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from physics.world.snapshot import KEPT, Snapshot
 
 
 class Places(NamedTuple):
-    """Worlds that go on from worlds of a snapshot."""
+    """Worlds to restore, and their sources in a snapshot."""
 
     worlds: np.ndarray | None  # (k,) indices into the batch; None: all
     source: np.ndarray | None  # (k,) indices into the snapshot; None: its one world, or its worlds in their order
@@ -50,7 +50,7 @@ def take(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
 
 
 def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
-    """Check arguments of `World.restore`, which documents them: the worlds meant."""
+    """Check the arguments of `World.restore`, which documents them; return the places."""
     validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
     is_own = snapshot.scene is world.scene_settings
     if not is_own:
@@ -81,7 +81,7 @@ def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
 
 
 def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
-    """Let worlds go on from a snapshot; arguments as checked by `places`."""
+    """Restore worlds from a snapshot; arguments as checked by `places`."""
     chosen, source, is_all = at_places
     if not is_all and snapshot.time != world.time:
         _check_clock(world, snapshot)
@@ -119,12 +119,12 @@ def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool)
 
 
 def _by_world(array: np.ndarray, rows: int, worlds: int) -> np.ndarray:
-    """(worlds, numbers of one) view of an array in which a world has so many rows."""
+    """View (worlds, numbers of one) of an array with so many rows per world."""
     return array.reshape(worlds, rows * array.shape[-1])
 
 
 def _is_alike(world: Batch, snapshot: Snapshot) -> bool:
-    """True for a snapshot of so many worlds of such a scene."""
+    """True for a snapshot of so many worlds of an equal scene."""
     return _fits(world, snapshot, world.worlds)
 
 
@@ -149,7 +149,7 @@ def _fits_actuation(actuation: tuple | None, rows: int) -> bool:
 
 
 def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
-    """Worlds of a snapshot of this scene, to be restored to `count` worlds."""
+    """Number of worlds in a snapshot of this scene, for a restoration of `count` worlds."""
     if any(getattr(value, "dtype", None) != np.float64 for value in snapshot.arrays):
         raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
     held = snapshot.worlds if len(snapshot.arrays) == len(world.kept()) else 0
@@ -159,7 +159,7 @@ def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
 
 
 def _check_scene(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse a snapshot of a scene whose settings, which no array holds, are others."""
+    """Refuse a snapshot of a scene with other settings outside the arrays."""
     other = None if snapshot.scene is None else other_setting(world.scene_settings, snapshot.scene)
     if other is not None:
         name, ours, theirs = other
@@ -170,7 +170,7 @@ def _check_scene(world: Batch, snapshot: Snapshot) -> None:
 
 
 def _check_inertia(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse bodies that the kernel of this scene cannot turn, as it leaves out parts of the rotation."""
+    """Refuse bodies that the kernel of this scene cannot turn, since it lacks parts of the rotation."""
     plan, rows = world.plan, snapshot.arrays[KEPT.index("params")]
     is_odd = not plan.gyroscopic and not is_isotropic(1.0 / rows[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()
     if not plan.offset_frame:
@@ -192,7 +192,7 @@ def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:
 
 
 def _check_clock(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse to restore some worlds to another time of fields that change with it: a batch has one time."""
+    """Refuse to restore some worlds to another time if a field depends on time: a batch has one time."""
     if reads_time(world.plan, world.params) or reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
         raise ValueError(
             f"snapshot is of time {snapshot.time!r} s, and the batch of time {world.time!r} s, in a scene with a field "

@@ -1,4 +1,4 @@
-"""A step that ends in an exception of a user's field has changed nothing."""
+"""Undo a step that ends in an exception of a user's field."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ MEBIBYTE = 2**20
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """States of a batch along a rollout; `samples` of them are kept.
+    """States of a batch along a rollout, `samples` of them.
 
     Attributes
     ----------
@@ -58,17 +58,17 @@ class Rollout:
 
     @property
     def report(self) -> StepReport:
-        """Report of all its steps together."""
+        """Report of all steps together."""
         return StepReport(self.report_table, self.names)
 
     @property
     def status(self) -> np.ndarray:
-        """(worlds,) int64, values of `Status`: the gravest thing that happened in any step."""
+        """Gravest outcome of any step, (worlds,) int64, values of `Status`."""
         return self.report.status
 
     @property
     def nbytes(self) -> int:
-        """Memory of its arrays [bytes]."""
+        """Memory of the arrays [bytes]."""
         arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
         return sum(array.nbytes for array in arrays)
 
@@ -198,7 +198,7 @@ def _columns(columns: Sequence[str]) -> list[str]:
 
 
 def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
-    """Arrays for the states; refused where this machine's memory does not hold them."""
+    """Arrays for the states; refused where this machine's memory is too small."""
     samples = next(iter(shapes.values()))[1]
     needed = 8 * (sum(int(np.prod(shape, dtype=object)) for shape in shapes.values()) + samples)
     memory = batch_arrays.machine_memory()
@@ -217,7 +217,7 @@ def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
 
 
 def _checked(out: Rollout, names: tuple[str, ...], shapes: dict[str, tuple[int, ...]]) -> Rollout:
-    """`out`, which must have exactly these arrays, and these names of bodies."""
+    """Check `out`: it must have exactly these arrays, and these names of bodies."""
     validation.instance(out, Rollout, "out", "None or a physics.Rollout")
     arrays = {name: getattr(out, name) for name in out.columns}
     is_ours = all(array.flags.c_contiguous and array.flags.writeable for array in arrays.values())

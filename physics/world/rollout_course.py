@@ -1,4 +1,4 @@
-"""The steps of a rollout: in machine code, or one by one where something is to be done between them."""
+"""The steps of a rollout: in machine code, or one by one if Python has work between them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def advance(world: Batch, wrenches: np.ndarray, into: Rollout, steps: int, dt: f
 
 
 def _needs_python(world: Batch, steps: int) -> bool:
-    """True if the actuator has to be asked between two steps."""
+    """True if Python has to call the actuator between two steps."""
     if world.actuation is None:
         return False
     return world.actuation.actuator.delay > 0.0 or (steps > 1 and takes_each_step(world))
@@ -68,7 +68,7 @@ def _all_at_once(world: Batch, wrenches, into: Rollout, steps: int, dt: float, e
 
 
 def _follow(world: Batch, dt: float) -> Follow | None:
-    """Numbers of the actuator for each step; None without one."""
+    """Numbers of the actuator for each step; None without an actuator."""
     if world.actuation is None:
         return None
     actuator, gone, kept = world.actuation.actuator, 1.0, 0.0

@@ -1,4 +1,4 @@
-"""The loop over time of a rollout, in each thread: all steps of a few worlds, before those of the next ones.
+"""Loop over time of a rollout in each thread: all steps of one block of worlds, then the next block.
 
 Worlds are independent, so that no thread waits for another one between two steps, and a block of worlds stays in the
 cache of its processor. `fused` has the whole loop in machine code, which makes prepared calls by their address. The
@@ -27,7 +27,7 @@ if COMPILER == FUSED:
 else:
 
     def perform_all(work, _count):
-        """Make prepared calls; False, or the exception that one raised."""
+        """Make prepared calls; return False, or the exception of one."""
         return work.perform()
 
 
@@ -40,7 +40,7 @@ FIRST, END, STEP, MOMENT_SIZE = range(4)
 
 
 def roll_out(outer, inner, block, starts, clock, moment, calls, count):
-    """Take all steps of the worlds that no other thread has taken, a block of them at a time.
+    """Take all steps of the worlds that no other thread has taken, a block at a time.
 
     A call that raises an exception ends it.
 
@@ -84,14 +84,14 @@ if COMPILER == FUSED:
 
 
 class RolloutLoop:
-    """The loop over time of a world, prepared once and run often.
+    """Loop over time of a world, prepared once and run often.
 
     Parameters
     ----------
     world : Batch
-        Without an actuator that has to be asked between two steps; while the loop runs, without a recorder.
+        Its actuator must need no call between two steps; while the loop runs it has no recorder.
     wrench : (worlds, bodies, 6) float64
-        Of the step to come; the actuator's own output where there is one. Written by what comes before a step.
+        Wrenches of the coming step; with an actuator, its output. A call before each step writes them.
     steps : int
         Steps that are taken at once.
     dt : float
@@ -162,13 +162,13 @@ def _clock(world: Batch, k: int) -> np.ndarray:
 
 
 class _Loop:
-    """`roll_out` run by Python, in a thread of a pool."""
+    """`roll_out` as a Python function, for a thread of a pool."""
 
     def __init__(self, arguments: tuple):
         self._arguments = arguments
 
     def perform(self) -> bool:
-        """Run it; raises what a step raises."""
+        """Run the loop; raise the exception of a step."""
         roll_out(*self._arguments)
         return False
 

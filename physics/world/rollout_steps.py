@@ -14,7 +14,7 @@ from physics.world.rollout_loop import END, FIRST, STEP
 
 
 class Follow(NamedTuple):
-    """An actuator without delay, over one step."""
+    """Numbers of an actuator without delay, for one step."""
 
     limit_force: float  # [N], inf where there is none
     limit_torque: float  # [N m]
@@ -25,7 +25,7 @@ class Follow(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Loads of a rollout, and where a step reads them."""
+    """Loads of a rollout, and the arrays from which a step reads them."""
 
     wrenches: np.ndarray  # (worlds, length, bodies, 6) force [N], torque [N m]
     held: np.ndarray  # (rows, 6) wrench of the next step
@@ -33,7 +33,7 @@ class Course(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """States that are kept, (worlds, samples, bodies, k) each; (0, 0, 0, 0) where a column is not."""
+    """Kept states, (worlds, samples, bodies, k) each; (0, 0, 0, 0) for a column that is not kept."""
 
     pos: np.ndarray
     quat: np.ndarray
@@ -52,7 +52,7 @@ def _keep(first, end, place, column, state, kept):
 
 @kernel
 def _follow(rows, follow, held):
-    """Let what is held be what an actuator makes of it."""
+    """Replace the held wrench by the actuator's response to it."""
     if follow is not None:
         command, output, applied = follow.command[rows], follow.output[rows], held[rows]
         for i in range(command.shape[0]):

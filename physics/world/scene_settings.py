@@ -1,4 +1,4 @@
-"""Settings of a scene that no array of a world holds: where a state goes on they must be the same."""
+"""Settings of a scene outside the arrays of a world; they must agree where a state is restored."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from physics.scene.force_field import Field
 from physics.scene.scene import Scene
 
 NUMBERS_IN_PLAN = (Actuator, Sleeping)
-"""Effects whose numbers are no parameters of a world."""
+"""Effects whose numbers are part of the plan, not parameters of a world."""
 
 
 def scene_settings(scene: Scene) -> dict[str, str]:
     """Settings of a scene by name, as text that can be compared, shown and kept in a file.
 
-    Sizes, masses, inertias and the numbers of most effects are none of them: they are parameters of each world.
+    They exclude sizes, masses, inertias and the numbers of most effects, which are parameters of each world.
     """
     return {
         "bodies": ", ".join(map(_body, scene.bodies)),
@@ -27,7 +27,7 @@ def scene_settings(scene: Scene) -> dict[str, str]:
 
 
 def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[str, Any, Any] | None:
-    """Name of the first setting that differs, and its values here and there (None: not told); None if all agree."""
+    """Name of the first setting that differs, with both values (None: unknown); None if all agree."""
     for name in (*ours, *theirs):
         if ours.get(name) != theirs.get(name):
             return name, ours.get(name), theirs.get(name)
@@ -40,7 +40,7 @@ def _body(body) -> str:
 
 
 def _effect(effect) -> str:
-    """Name of an effect, with what decides which kernel is compiled for it."""
+    """Name of an effect, with its settings that decide the choice of kernel."""
     if isinstance(effect, NUMBERS_IN_PLAN):
         return repr(effect)
     if isinstance(effect, Contact):
@@ -51,6 +51,6 @@ def _effect(effect) -> str:
 
 
 def _switches(contact: Contact) -> list[str]:
-    """Properties that a contact has, apart from their numbers."""
+    """Switches of a contact, without its numbers."""
     named = [name for name in ("restitution", "tangential", "stiffness") if getattr(contact, name) is not None]
     return named + ["walls alone"] * (not contact.between_bodies)

@@ -56,7 +56,7 @@ def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution
 def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str = "start") -> None:
     """Give worlds new states and new parameters at once; after an error nothing has changed.
 
-    Both are checked together: neither the old state with the new sizes nor the reverse needs to be possible.
+    States and parameters are checked together: the old state need not be possible with the new sizes, nor the reverse.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str =
 
 
 def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndarray:
-    """Rows of the state with what is not None in place of what was."""
+    """New rows of the state: arguments that are not None replace the old columns."""
     state = world.state[rows]
     given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
              ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
@@ -102,7 +102,7 @@ def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndar
 
 
 def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, friction, restitution, effects) -> np.ndarray:
-    """Rows of the parameters with what is not None in place of what was."""
+    """New rows of the parameters: arguments that are not None replace the old columns."""
     params = world.params[rows]
     plan, shape = world.plan, (len(chosen), world.body_count)
     if mass is not None or size is not None or inertia_body is not None:
@@ -144,7 +144,7 @@ def _new_gravity(world: Batch, chosen, gravity) -> np.ndarray:
 
 
 def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse what no step could start from: bodies deep in a wall, or in the same place.
+    """Refuse impossible starts: bodies deep in a wall, or in the same place.
 
     Parameters and errors are those of `check_depth`.
     """
@@ -154,10 +154,10 @@ def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 
 
 def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse two bodies that touch each other with their centres in the same place: no way apart is nearer than others.
+    """Refuse two touching bodies with their centres in the same place, which have no shortest way apart.
 
-    Bodies in the same place are neighbours in the order along any direction, and in that along one that no scene is
-    built along hardly any others are.
+    Bodies in the same place are neighbours in the order along any direction. Along a direction that scenes seldom use,
+    hardly any other bodies are neighbours.
     """
     shape = (len(chosen), world.body_count)
     centres = geometric_centres(world, state, params).reshape(*shape, 3)
@@ -241,7 +241,7 @@ def _check_axis(friction: Friction, declared: Friction) -> None:
 
 
 def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
-    """The scene's kinds of field that `effects` are of, with these in place of the scene's."""
+    """Kinds of field in the scene that `effects` belong to, with these in place of the scene's."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if not isinstance(effect, Field):
@@ -268,7 +268,7 @@ def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
 
 
 def _chosen(world: Batch, worlds) -> np.ndarray:
-    """Indices (k,) int64 of the worlds meant by what a user gives."""
+    """Indices (k,) int64 of the worlds that a user chooses."""
     return np.arange(world.worlds) if worlds is None else choice.chosen(worlds, world.worlds)
 
 

@@ -1,4 +1,4 @@
-"""Snapshots: all that decides how a world goes on."""
+"""Snapshots: copies of all that decides the future of a world."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Everything that decides how a `World` goes on: states, warm starts, parameters, time, the actuator's memory.
+    """Copy of a `World`'s whole state: states, warm starts, parameters, time, the actuator's memory.
 
     Parameters
     ----------
@@ -57,17 +57,17 @@ class Snapshot:
 
     @property
     def worlds(self) -> int:
-        """Number of worlds that it is of."""
+        """Number of worlds in the snapshot."""
         return len(self.arrays[KEPT.index("gravity")])
 
     def renew(self, time: float, actuation: tuple | None, scene: Mapping[str, str]) -> None:
-        """Be of another moment: whoever has overwritten `arrays` calls this (`World.snapshot` with `out`)."""
+        """Mark the snapshot as new, after `arrays` have been overwritten (`World.snapshot` with `out`)."""
         new = {"time": time, "actuation": actuation, "compiler": COMPILER, "is_read": False, "scene": scene}
         for name, value in new.items():
             object.__setattr__(self, name, value)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write it as ``.npz`` (`load` reads it); returns the path.
+        """Write the snapshot as ``.npz`` (`load` reads it); return the path.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Snapshot:
         return Path(path)
 
     def write(self, file: BinaryIO) -> None:
-        """Write it into an open file, as `save` does."""
+        """Write the snapshot into an open file, as `save` does."""
         parts: dict[str, Any] = {"time": np.float64(self.time), **dict(zip(KEPT, self.arrays))}
         if self.actuation is not None:
             output, late = self.actuation
@@ -90,7 +90,7 @@ class Snapshot:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Snapshot:
-        """Read a snapshot that `save` has written, bit for bit; nothing in a file is run.
+        """Read a snapshot that `save` has written, bit for bit, without running code from the file.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Snapshot:
 
     @classmethod
     def read(cls, content: BinaryIO, path: str | os.PathLike) -> Snapshot:
-        """Read the content of a file as `load` does; `path` is its name in an error."""
+        """Read the content of a file as `load` does; errors name the file `path`."""
         return FILE.read(content, path, _from_parts)
 
     __repr__ = parts_repr
@@ -123,7 +123,7 @@ def _is_scene(value: Any) -> bool:
 
 
 def _from_parts(head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> Snapshot:
-    """Snapshot of the head and the arrays of a file; whether they fit a scene is found out by who restores it."""
+    """Make a snapshot of the head and the arrays of a file; its user checks whether it fits a scene."""
     compiler, scene = head_value(head, "compiler", is_text, "the name of a compiler"), None
     if head["format"] > TIMES:
         scene = head_value(head, "scene", _is_scene, "null and settings of a scene by name, as text")

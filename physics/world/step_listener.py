@@ -1,4 +1,4 @@
-"""Interface of those whom a world tells of its steps, so that a world knows no recorder."""
+"""Interface of listeners to a world's steps, so that a world needs no import of its recorder."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 
 class StepListener(Protocol):
-    """Object that is told of every step of a world, as `physics.Recorder` is."""
+    """Listener to every step of a world, such as `physics.Recorder`."""
 
     def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
-        """`steps` steps of `dt` [s] are about to be taken with a wrench (worlds, bodies, 6)."""
+        """Note that `steps` steps of `dt` [s] are about to be taken with a wrench (worlds, bodies, 6)."""
 
     def after(self) -> None:
-        """They have been taken."""
+        """Note that the steps have been taken."""
 
     def undone(self) -> None:
-        """They are none: an exception has put everything back."""
+        """Note that the steps were undone: an exception has restored everything."""
 
     def changed(self, worlds: np.ndarray | slice) -> None:
-        """These worlds were changed from outside."""
+        """Note that these worlds were changed from outside."""

@@ -1,4 +1,4 @@
-"""Distances of bodies to walls where they are, without a step."""
+"""Distances of bodies to walls in the present state, without a step."""
 
 from __future__ import annotations
 

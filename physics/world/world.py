@@ -140,11 +140,11 @@ class World(Batch):
 
     @exclusive
     def make_event_room(self, room: int) -> None:
-        """Let a step log up to `room` events per body, 0 at first; for `simulate`.
+        """Give a step's log room for `room` events per body, 0 at first; for `simulate`.
 
-        They go to `event_log` (worlds * bodies, room, EVENT_SIZE), columns in
-        `physics.kernels.time_stepping.event_log`; their number to `event_counts` (worlds * bodies,) int64, those that
-        found no room included: more than `room` says so. Prepare a `Stepper` after this.
+        Events go to `event_log` (worlds * bodies, room, EVENT_SIZE), with columns in
+        `physics.kernels.time_stepping.event_log`. Their number goes to `event_counts` (worlds * bodies,) int64, and
+        includes events without room. Prepare a `Stepper` after this.
         """
         self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
         self._bound_for = None
@@ -211,10 +211,10 @@ class World(Batch):
         return self.report
 
     def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Make the `kernel_calls` of so many steps of `dt` [s] with this wrench; for those who prepare them.
+        """Run the `kernel_calls` of some steps of `dt` [s] with this wrench, for callers that prepare them.
 
-        A `Stepper` leaves this out where it comes to one call: what takes part in a step here is in `stepper._is_all`.
-        Where a user's field raises an exception nothing has changed.
+        A `Stepper` skips this function if one call is enough; `stepper._is_all` lists the other parts of a step. If a
+        user's field raises an exception nothing has changed.
         """
         before = Before(self) if self._may_raise else None
         try:
@@ -232,7 +232,7 @@ class World(Batch):
             self._tell(self.recorder.after)
 
     def _tell(self, message: Callable[..., None], *arguments) -> None:
-        """Tell the recorder, which may take snapshots meanwhile."""
+        """Notify the recorder, which may take snapshots meanwhile."""
         self.telling = get_ident()
         try:
             message(*arguments)
@@ -241,7 +241,7 @@ class World(Batch):
 
     @property
     def report(self) -> StepReport:
-        """Report of the last step, whoever took it."""
+        """Report of the last step, also of one taken by another caller."""
         return StepReport(self.report_table.copy(), self.names)
 
     # --- changing ----------------------------------------------------------------------------------------------
@@ -256,7 +256,7 @@ class World(Batch):
         angvel: ArrayLike | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
-        """Put bodies elsewhere; what is None keeps its value.
+        """Set the state of bodies; None keeps the old values.
 
         Parameters
         ----------
@@ -290,7 +290,7 @@ class World(Batch):
         effects: Sequence[Field | Friction | RollingFriction | SpinFriction] | None = None,
         worlds: ArrayLike | None = None,
     ) -> None:
-        """Give worlds their own physical parameters; what is None keeps its value.
+        """Give worlds their own physical parameters; None keeps the old values.
 
         Parameters
         ----------
@@ -326,7 +326,7 @@ class World(Batch):
     @known_keywords
     @exclusive
     def snapshot(self, worlds: ArrayLike | None = None, out: Snapshot | None = None) -> Snapshot:
-        """All that decides the future, copied; `restore` continues bit-identically, warm starts and all.
+        """Copy the whole state; `restore` continues it bit for bit, warm starts included.
 
         Parameters
         ----------
@@ -373,7 +373,7 @@ class World(Batch):
         self.restore_at(snapshot, restoring.places(self, snapshot, worlds, source))
 
     def restore_at(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
-        """`restore` after its checks: for who has made them with `restoring.places`."""
+        """Do `restore` after its checks, for callers that made them with `restoring.places`."""
         if self.is_torn and at_places.is_all:
             self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
         self._restore(snapshot, at_places)
@@ -410,7 +410,7 @@ class World(Batch):
 
     @property
     def asleep(self) -> NDArray[np.bool_]:
-        """(worlds, bodies) bool: which bodies sleep; see `physics.Sleeping`. A new array."""
+        """Sleeping bodies (worlds, bodies) bool, a new array; see `physics.Sleeping`."""
         if not self.plan.sleeping:
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
         return self.sleep[:, SLEEP_GROUP].reshape(self.worlds, self.body_count) > 0.0

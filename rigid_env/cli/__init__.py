@@ -1,4 +1,4 @@
-"""The command line ``rigid-env``. A command imports what it needs when it runs: ``--help`` is quick."""
+"""The command line ``rigid-env``. Each command imports its packages when it runs, so ``--help`` is quick."""
 
 from __future__ import annotations
 

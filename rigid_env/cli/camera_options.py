@@ -1,4 +1,4 @@
-"""Options of commands that draw: from where, towards what, and with arrows or without."""
+"""Options of commands that draw: eye and target of the camera, and whether arrows are drawn."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ArrowsOption = Annotated[
 
 
 def checked_camera(eye: Point | None, target: Point | None) -> Camera | None:
-    """Camera of the options, with y upwards, or -z where it looks straight up or down; None where there is no eye.
+    """Camera that the options describe, or None without an eye; y is up, or -z if it looks straight up or down.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def checked_camera(eye: Point | None, target: Point | None) -> Camera | None:
 
 
 def checked_shot(eye: Point | None, target: Point | None, arrows: bool) -> Shot:
-    """View of a motion that the options ask for; without a target the middle of the motion is in the picture's.
+    """View of a motion from the options; without a target the camera looks at the middle of the motion.
 
     Raises
     ------

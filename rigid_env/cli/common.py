@@ -45,7 +45,7 @@ SceneArgument = Annotated[
 
 
 def at_least(least: int):
-    """A check of an option's number, for its `callback`: the error names the value and what is allowed."""
+    """Make a check of a least number, for an option's `callback`; the error names the value and the allowed ones."""
 
     def check(value: float) -> float:
         if not value >= least:
@@ -57,7 +57,7 @@ def at_least(least: int):
 
 @contextlib.contextmanager
 def told_errors():
-    """Turn what a user can put right into a message without a traceback, and Ctrl-C into an exit status."""
+    """Print errors that a user can mend without a traceback, and turn Ctrl-C into an exit status."""
     from gymnasium.error import DependencyNotInstalled
 
     try:
@@ -74,7 +74,7 @@ def told_errors():
 
 @contextlib.contextmanager
 def ending_on_sigterm() -> Iterator[None]:
-    """Let SIGTERM end the block as Ctrl-C does: what is started in the background ignores SIGINT."""
+    """End the block at SIGTERM as at Ctrl-C: programs started in the background ignore SIGINT."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -83,7 +83,7 @@ def ending_on_sigterm() -> Iterator[None]:
 
 
 def collect(found: list, parts: Iterable[list]) -> bool:
-    """Add every part to the list as soon as it is there; False if Ctrl-C came before the last."""
+    """Append each part to the list once it is measured; False if Ctrl-C came before the last."""
     try:
         for part in parts:
             found += part
@@ -93,7 +93,7 @@ def collect(found: list, parts: Iterable[list]) -> bool:
 
 
 def end(is_complete: bool, lacking: str = "") -> None:
-    """Say why a measurement is not complete, or which package a picture lacks, and exit with the status for it."""
+    """Print why a measurement is incomplete, or which package a picture lacks, and exit with the status for it."""
     if lacking:
         typer.echo(f"Error: {lacking}", err=True)
     if not is_complete:
@@ -104,9 +104,9 @@ def end(is_complete: bool, lacking: str = "") -> None:
 
 
 def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
-    """Path of a plot that can be drawn, and the line for `end` where matplotlib is missing.
+    """Return the path of a plot if matplotlib is installed, and the message for `end` if it is not.
 
-    The line is printed at once, too: whoever wants the plot need not wait for the measurement.
+    The message is also printed at once, before the measurement, so that a user can still stop it.
     """
     from rigid_env.lab.measure.plotting import lacks_matplotlib
 
@@ -117,7 +117,7 @@ def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
 
 
 def write(path: Path | None, content: dict, console: Console) -> None:
-    """Write numbers as JSON, with the machine they are from, and say where."""
+    """Write numbers and the machine that measured them as JSON, and print the path."""
     if path is None:
         return
     from rigid_env.lab.measure.machine import write_json
@@ -127,5 +127,5 @@ def write(path: Path | None, content: dict, console: Console) -> None:
 
 
 def tell_file(path: Path, console: Console) -> None:
-    """Say that a file was written."""
+    """Print the path of a file that was written."""
     console.print(f"written     {path}", soft_wrap=True)

@@ -79,7 +79,7 @@ def _make(task: str) -> RigidEnv:
 
 
 def _table(section: Section) -> Table:
-    """The table of a section; numbers are never broken."""
+    """Table of a section; cells with numbers are never broken."""
     table = Table([Column(name, is_number=name in NUMBERS) for name in map(_shown, section.columns)])
     for row in section.rows:
         table.add_row(*map(_shown, row))

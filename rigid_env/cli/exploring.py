@@ -109,7 +109,7 @@ def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float
 
 
 def _draw(done: Demo, paths: list[Path], shot: Shot, console: Console) -> None:
-    """Draw and write pictures, and say where."""
+    """Draw and write pictures, and print their paths."""
     for path in paths:
         with progress_bar(console) as progress:
             task = progress.add_task("drawing", total=done.frame_count)
@@ -201,7 +201,7 @@ def explain(
 
 
 def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Console) -> list[dict]:
-    """Measure and print what the effects of a scene do in a run; the same for JSON."""
+    """Measure and print each effect's share in a run; return the same for JSON."""
     from rigid_env.lab.measure import shares
 
     with progress_bar(console, has_thread=False) as progress:

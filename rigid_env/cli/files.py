@@ -1,4 +1,4 @@
-"""Files that commands write: refused before anything is computed, or their folders are made.
+"""Paths of files that commands write: checked before the computation, their folders made after it.
 
 One rule for all: the ending is one that the command writes, the path is no folder, and the file, or the nearest folder
 above it that exists, can be written.
@@ -36,7 +36,7 @@ def output_option(name: str, *endings: str, help: str):
 
 
 def checked(path: Path, endings: Sequence[str]) -> Path:
-    """The absolute path of a file that can be written; nothing is made.
+    """Absolute path of a file, checked to be writable; makes nothing.
 
     Devices, such as ``/dev/stdout``, need no ending.
 
@@ -61,7 +61,7 @@ def checked(path: Path, endings: Sequence[str]) -> Path:
 
 
 def checked_folder(path: Path) -> Path:
-    """The absolute path of a folder that exists or can be made; nothing is made.
+    """Absolute path of a folder that exists or can be made; makes nothing.
 
     Raises
     ------
@@ -95,5 +95,5 @@ def make_parents(*paths: Path | None) -> None:
 
 
 def _nearest(path: Path) -> Path:
-    """The path itself, or the nearest above it that exists."""
+    """The path itself, or the nearest parent that exists."""
     return next(place for place in (path, *path.parents) if place.exists())

@@ -16,11 +16,11 @@ CANONICAL = (
     "drop", "flight", "tumble", "rest", "shove", "corner_drop", "slide", "bounce", "rolling_sphere", "vertex_drop",
     "closed_box", "tower", "heap", "football", "incline",
 )  # fmt: skip
-"""Names of `physics.scenes.SCENES`, which takes long to import, too."""
+"""Names of `physics.scenes.SCENES`, listed here because that module takes long to import."""
 
 
 def load_scene(name: str) -> tuple[str, Scene]:
-    """A canonical scene, or that of a file, and a short name for it.
+    """Return the scene of a name or a file, and a short name for it.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def load_scene(name: str) -> tuple[str, Scene]:
 
 
 def checked_preset(name: str | None) -> str | None:
-    """Check the name of a preset, for the `callback` of an option: a shell has no `physics.Accuracy`."""
+    """Check the name of a preset, for the `callback` of an option; a shell can pass no `physics.Accuracy`."""
     from physics import PRESETS
     from physics.keywords import nearest_first
 

@@ -71,9 +71,9 @@ def _export(what: str, path: Path, duration: float, settings: dict, console) -> 
 
 
 def _serve(what: str, host: str, port: int, browser: bool, settings: dict, console) -> None:
-    """Serve until Ctrl-C or SIGTERM; the address is told once it is sure that there will be something to look at.
+    """Serve until Ctrl-C or SIGTERM; print the address once the subject of the viewer is ready.
 
-    A canonical scene is sure. The browser then loads the page while the engine is imported.
+    For a canonical scene the address is printed at once. The browser then loads the page while the engine is imported.
     """
     from rigid_env.viewer.servers import start_viewer_server, stop_server
 
@@ -97,7 +97,7 @@ def _serve(what: str, host: str, port: int, browser: bool, settings: dict, conso
 
 
 def _tell_address(server, browser: bool, console) -> None:
-    """Say where a viewer is, and open a browser there where one is wanted."""
+    """Print the address of a viewer, and open a browser there if one is wanted."""
     from rigid_env.viewer.servers import address_of, directions
 
     for text in directions(server):

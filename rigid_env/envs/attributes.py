@@ -1,4 +1,4 @@
-"""Attributes of environments that belong to one world each: parameters of its episode, its generator."""
+"""Attributes of environments that have a value in each world: parameters of the episode, random generator."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     T_co = TypeVar("T_co", covariant=True)
 
     class _Drawn(Generic[T_co]):
-        """A parameter as checkers see it: read as a number or an array, set to more than that."""
+        """Type of a parameter for type checkers: reads give a number or an array, settings accept more."""
 
         def __get__(self, env: Any, kind: Any = None) -> T_co: ...
 
@@ -36,12 +36,12 @@ def _parameter(field: str, what: str) -> property:
 
 
 def value_of(value: Any) -> Any:
-    """A float of a scalar, a copy of an array."""
+    """Return a float from a scalar, or a copy of an array."""
     return float(value) if np.ndim(value) == 0 else value.copy()
 
 
 class EpisodeParameters:
-    """The parameters of a single environment's episode as attributes, to read and to set.
+    """Parameters of a single environment's episode as attributes that can be read and set.
 
     Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then.
     """
@@ -64,20 +64,20 @@ SHARED = (
     "accuracy", "autoreset_mode", "control_dt", "dt", "effects", "frame_skip", "max_episode_steps", "metadata",
     "render_mode", "spec",
 )  # fmt: skip
-"""Attributes that are the same in all worlds of a batch."""
+"""Names of attributes that are the same in all worlds of a batch."""
 
 OF_BLOCKS = ("half_width", "walls")
-"""More of them, of the block's tasks."""
+"""Names of further shared attributes, of the block's tasks."""
 
 SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
-"""Attributes of one world under other names, or in tuples, in the batch."""
+"""Names of a world's attributes that a batch keeps under another name or as a tuple."""
 
 
 class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
     """`call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
 
-    What Gymnasium's `SyncVectorEnv` asks of its environments one by one is here a look into the batch. Names that
-    mean nothing for one world of it are refused, never ignored.
+    Gymnasium's `SyncVectorEnv` calls its environments one by one; here each call reads the batch. Names without a
+    meaning for a single world of it are refused, never ignored.
     """
 
     task: Any

@@ -1,4 +1,4 @@
-"""Tasks of the block as environments, and as batches of worlds: what they have in common."""
+"""Common base of the block's environments, single and native vector."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of a task of one's own: what Gymnasium asks of environments, and what this package promises of its own."""
+"""Checks of a user's task: Gymnasium's rules for environments, and further promises of this package."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENVS = 3
 
 
 class CheckError(AssertionError):
-    """A task does not do what environments promise."""
+    """Error of a task that breaks a promise of environments."""
 
 
 def check_task(
@@ -31,8 +31,8 @@ def check_task(
 ) -> None:
     """Check a task as an environment.
 
-    Gymnasium's `check_env`; the same numbers in a batch as alone, for the same seeds, in later episodes, too, in all
-    modes of starting anew; seeds; copies by `pickle`; workers.
+    It runs Gymnasium's `check_env`. It compares a batch with single environments for the same seeds, also in later
+    episodes and in all modes of automatic reset. It checks seeds, copies by `pickle`, and worker processes.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class _Checks:
         return TaskVectorEnv(ENVS, task=self.kind, autoreset_mode=mode, max_episode_steps=limit, **self.settings)
 
     def alone_as_in_a_batch(self) -> None:
-        """World i of a batch goes through the same bits as an environment with its seed."""
+        """Compare world i of a batch with an environment of its seed, bit for bit."""
         envs = self.batch()
         together, _ = envs.reset(seed=SEED)
         singles = [TaskEnv(self.kind, **self.settings) for _ in range(ENVS)]
@@ -99,14 +99,14 @@ class _Checks:
                 return
 
     def later_episodes(self) -> None:
-        """Episodes after the first are those of single environments in all modes of starting anew."""
+        """Compare episodes after the first with those of single environments, in all modes of automatic reset."""
         worlds = range(ENVS)
         alone = [_Episodes(TaskEnv(self.kind, **self.settings), i, self.actions[:, i], self.limit) for i in worlds]
         for mode in AutoresetMode:
             self._starts_anew(mode, alone)
 
     def _starts_anew(self, mode: AutoresetMode, alone: list[_Episodes]) -> None:
-        """Episodes end at the limit and start anew as the mode says, each as it would alone, and in its space."""
+        """Check that episodes end at the limit, and restart as the mode says, like those of a single environment."""
         is_late = mode is AutoresetMode.NEXT_STEP  # a world starts anew in the step after that in which it ended
         envs = self.batch(mode, self.limit)
         obs, _ = envs.reset(seed=SEED)
@@ -132,7 +132,7 @@ class _Checks:
         envs.close()
 
     def seeds(self) -> None:
-        """The same seed gives the same episode, another seed another one where anything is drawn."""
+        """Check that the same seed repeats an episode, and that another seed changes it if anything is drawn."""
         env = TaskEnv(self.kind, **self.settings)
         first, second = self._trajectory(env, SEED), self._trajectory(env, SEED)
         _same("trajectory", first, second, f"seed {SEED} twice")
@@ -142,7 +142,7 @@ class _Checks:
             _require(not is_same, "the seeds 1 and 2 draw the same values")
 
     def copies(self) -> None:
-        """A pickled copy goes on with the same bits."""
+        """Check that a pickled copy continues with the same bits."""
         env = TaskEnv(self.kind, **self.settings)
         env.reset(seed=SEED)
         for k in range(self.steps // 4):
@@ -157,7 +157,7 @@ class _Checks:
                 _same("episode of a pickled copy", env.reset()[0], twin.reset()[0], f"step {k}")
 
     def workers(self, task: type[Task] | str, context: str) -> None:
-        """Workers give the numbers of the batch."""
+        """Check that worker processes give the numbers of the batch."""
         settings = self.settings
         make: Callable[[], gym.Env] = lambda: TaskEnv(task, **settings)  # noqa: E731 (a closure, which workers are sent)
         workers = gym.vector.AsyncVectorEnv([make] * 2, context=context)
@@ -181,7 +181,7 @@ class _Checks:
 
 
 class _Episodes:
-    """Steps and starts of a single environment, to which those of a world of a batch are compared.
+    """Steps and starts of a single environment, for comparison with those of a world of a batch.
 
     A field that changes with time sees the one time of a batch: later episodes of such a scene are not compared.
     """

@@ -18,7 +18,7 @@ MOST_ROWS = 65_536
 
 
 class ContactInfos:
-    """Reader of the contacts that the infos of a task hold.
+    """Reader of a task's contacts for infos.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class ContactInfos:
 
 
 def contact_infos(task: Task, contacts: int) -> ContactInfos | None:
-    """Make the reader that the argument `contacts` of an environment asks for; None where it is 0.
+    """Make the reader for the environment's argument `contacts`; None where it is 0.
 
     Raises
     ------

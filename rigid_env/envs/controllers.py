@@ -1,4 +1,4 @@
-"""Controllers of the block's tasks, written by hand.
+"""Hand-written controllers for the block's tasks.
 
 A controller is a function from observations (n, entries) to actions (n, 6). It sees what an agent sees, and knows the
 block's observation table (see `rigid_env.envs.block_reach`), nothing else.

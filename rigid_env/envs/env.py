@@ -191,7 +191,7 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
 
     @exclusive
     def get_state(self) -> TaskState:
-        """Copy all that decides how the episode goes on: `set_state` continues bit-identically, generator and all.
+        """Copy the whole state of the episode, random generator included; `set_state` continues it bit for bit.
 
         Returns
         -------
@@ -202,7 +202,7 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
 
     @exclusive
     def set_state(self, state: TaskState, source: int = 0) -> None:
-        """Go on from a state of this task, of an environment or of one world of a batch.
+        """Continue from a state of this task, taken from an environment or from one world of a batch.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         return markdown(self.documentation())
 
     def documentation(self) -> tuple[Section, ...]:
-        """The same, section by section; with the defaults of the id that this environment was made by, if any."""
+        """Sections of `describe`; includes the defaults of the environment's id, if it was made from one."""
         registered = None if self.spec is None else gym.registry.get(self.spec.id)
         documented = self._documented()
         own = list(inspect.signature(RigidEnv.__init__).parameters.values())[2:]  # without self and task
@@ -250,7 +250,7 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         return sections(self.task, documented, added, None if registered is None else registered.kwargs)
 
     def _documented(self) -> type:
-        """Class whose docstring tells about the task."""
+        """Class whose docstring documents the task."""
         return type(self.task)
 
     def close(self) -> None:

@@ -10,13 +10,13 @@ from rigid_env.tasks.goal import GoalTask
 
 
 def lend_goals(task: Task, env) -> None:
-    """Give an environment the method `compute_reward` of a task with goals; others must not have one."""
+    """Give an environment the method `compute_reward` of a task with goals; other environments must lack it."""
     if isinstance(task, GoalTask):
         env.compute_reward = task.compute_reward
 
 
 class GoalSource:
-    """Observations with both goals beside them, as dicts.
+    """Source of observations as dicts, each with the achieved and the desired goal.
 
     Parameters
     ----------

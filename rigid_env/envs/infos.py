@@ -10,7 +10,7 @@ from rigid_env.tasks.layout import INFO, SUCCESS
 
 
 class InfoMaker:
-    """Make the dict of an info from the row of an outcome, and the status.
+    """Maker of the info dict of a step, from the row of an outcome and the status.
 
     It is built by a dict display with these names, compiled when this is made: `dict(zip(names, row))` takes three
     times as long, a twentieth of a step of one environment.
@@ -39,7 +39,7 @@ class InfoMaker:
 
 
 class ContactInfoMaker:
-    """Make the same, with the contacts of the world.
+    """Maker of an info dict that also holds the contacts of the world.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From a task class, or where it stands, to a batch of worlds."""
+"""Make a batch of worlds from a task class, or from its name ``module:Class``."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from physics.keywords import nearest_first
 from rigid_env.tasks import Task
 
 OF_ENVIRONMENT = ["render_mode", "width", "height", "camera", "arrows", "obs", "obs_size", "obs_stack", "contacts"]
-"""Settings of an environment that are none of its task."""
+"""Names of settings that belong to an environment, not to its task."""
 
 
 def task_class(task: type[Task] | str) -> type[Task]:
-    """Task class from itself, or from ``module:Class``.
+    """Return a task class, given itself or as ``module:Class``.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def task_class(task: type[Task] | str) -> type[Task]:
 
 
 def _tasks_of(module: str) -> list[str]:
-    """Names, ``module:Class``, of the tasks that a module holds, if it has been imported."""
+    """Names ``module:Class`` of the tasks in a module that has been imported."""
     found = vars(sys.modules[module]) if module in sys.modules else {}
     classes = [name for name, each in found.items() if inspect.isclass(each) and issubclass(each, Task)]
     return [f"{module}:{name}" for name in classes if found[name] is not Task]
@@ -60,7 +60,7 @@ def make_task(task: type[Task] | str, worlds: int, settings: Mapping[str, Any]) 
 
 
 def check_settings(kind: type[Task], settings: Mapping[str, Any], of_environment: bool = False) -> None:
-    """Raise a TypeError at a setting that the task, or the environment with it, does not know."""
+    """Raise a TypeError for a setting that neither the task nor its environment knows."""
     known = _settings_of(kind)
     if of_environment:
         known += OF_ENVIRONMENT
@@ -71,7 +71,7 @@ def check_settings(kind: type[Task], settings: Mapping[str, Any], of_environment
 
 
 def _settings_of(kind: type[Task]) -> list[str]:
-    """Arguments of a task's constructor, and of those that it hands others on to."""
+    """Arguments of a task's constructor, and of constructors that it passes others on to."""
     names: list[str] = []
     for each in kind.__mro__:
         if "__init__" not in vars(each):

@@ -1,4 +1,4 @@
-"""Environments of this package by what a user types: an id, or a task's class; modules of the working folder count."""
+"""Find an environment by the text that a user types: an id, or a task class, also from the working folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigid_env.envs.task import TaskEnv
 CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
 
 NAMED = 5
-"""Names that a message about an unknown one lists."""
+"""Number of names in the message about an unknown one."""
 
 
 def known_ids() -> list[str]:
@@ -25,7 +25,7 @@ def known_ids() -> list[str]:
 
 
 def near_names(name: str, others: Iterable[str] = ()) -> list[str]:
-    """Ids, and `others`, that a name is like, without namespace, version and module; the first ids if it is like none.
+    """Ids, and names of `others`, similar to a name without namespace, version and module; the first ids if none is.
 
     Gymnasium's own guess knows all environments, and no namespace that is left out.
     """
@@ -35,12 +35,12 @@ def near_names(name: str, others: Iterable[str] = ()) -> list[str]:
 
 
 def _bare(name: str) -> str:
-    """Name of an id: BlockReach of ``module:rigid_env/BlockReach-v0``."""
+    """Bare name of an id: BlockReach of ``module:rigid_env/BlockReach-v0``."""
     return re.sub(r"-v\d+$", "", re.split("[:/]", name)[-1])
 
 
 def not_there(name: str, field: str = "env", why: object = "", others: Iterable[str] = ()) -> ValueError:
-    """Error for a name under which there is no environment, with the names that it is like.
+    """Error for the name of no environment; it lists similar names.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def not_there(name: str, field: str = "env", why: object = "", others: Iterable[
 
 
 def make_named(name: str, field: str = "env", others: Iterable[str] = ()) -> gym.Env:
-    """Make an environment that a user names.
+    """Make the environment that a user names.
 
     Parameters
     ----------

@@ -36,10 +36,10 @@ from physics import validation
 from rigid_env.extras import require
 
 MODEL, ARRAYS = ".zip", ".npz"
-"""Endings of a model of Stable-Baselines3, the only file that is read by `pickle`, and of plain arrays."""
+"""Endings of policy files: a model of Stable-Baselines3, the only one read by `pickle`, and plain arrays."""
 
 WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
-"""Arguments for loading a model that only acts: no memory for a replay buffer, and no environment for its rewards."""
+"""Arguments for loading a model that only acts, without replay buffer and environment."""
 
 ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "tanh": np.tanh,
@@ -50,7 +50,7 @@ ACTIVATIONS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 
 SETTINGS = {"PPO": "clip_range", "SAC": "target_entropy", "TD3": "policy_delay", "A2C": "gae_lambda"}
-"""Algorithms of Stable-Baselines3 for actions that are numbers, and a setting by which each is told from those below.
+"""Algorithms of Stable-Baselines3 for continuous actions, each with a setting that the following ones lack.
 
 DDPG is TD3 with other settings.
 """
@@ -93,7 +93,7 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
 
 
 def tell_code_runs(path: Path) -> None:
-    """Say on standard error that the file about to be read can run code."""
+    """Print a warning on standard error that the file about to be read can run code."""
     told = "a model of Stable-Baselines3: code in it runs while it is read; take it from those you trust only"
     print(f"rigid-env: {path} is {told}", file=sys.stderr, flush=True)
 
@@ -104,7 +104,7 @@ def greedy(model: Any) -> Callable[[Observations], np.ndarray]:
 
 
 def load_model(path: Path) -> Any:
-    """Load a model of Stable-Baselines3 to act with; its code runs, and a line on standard error says so before.
+    """Load a model of Stable-Baselines3 for acting. Its code runs; a line on standard error warns of that first.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def load_model(path: Path) -> Any:
 
 
 def _algorithm(path: Path) -> str:
-    """Name of the algorithm of a model's file, from the settings in it; nothing is run."""
+    """Name of the algorithm of a model's file, read from its settings without running code."""
     try:
         with zipfile.ZipFile(path) as content:
             settings = content.read("data")
@@ -200,7 +200,7 @@ class Network:
         return np.clip(ACTIVATIONS[self.output](x @ w + b), -1.0, 1.0).astype(np.float32)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write it as ``.npz``, the ending that `path` must have (`load_policy` reads it); returns the path."""
+        """Write the network as ``.npz``, which `path` must end with, for `load_policy`; return the path."""
         if Path(validation.path(path)).suffix.lower() != ARRAYS:
             raise ValueError(f"path is {str(path)!r}; allowed is the ending {ARRAYS}")
         arrays = {f"{name}{k}": array for k, pair in enumerate(self.layers) for name, array in zip("wb", pair)}
@@ -210,7 +210,7 @@ class Network:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Network:
-        """Read a network; nothing in a file is run, whatever it holds.
+        """Read a network without running code from the file.
 
         Raises
         ------

@@ -20,7 +20,7 @@ SCENE_ID = f"{NAMESPACE}/Scene-v0"
 
 
 def register_envs() -> None:
-    """Register every environment of the package with Gymnasium; what is registered already stays.
+    """Register every environment of the package with Gymnasium; ids that are registered already stay.
 
     ``import rigid_env`` calls it. Gymnasium imports no package on its own account in any version that this one runs
     with (1.1 to 1.4): ``gymnasium.make("rigid_env/BlockReach-v0")`` needs that import first, in every process, and the

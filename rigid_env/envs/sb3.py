@@ -1,4 +1,4 @@
-"""Stable-Baselines3 on the native batch: one call per step, not a loop over environments."""
+"""Adapter of the native batch for Stable-Baselines3: one call per step, not a loop over environments."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ except ImportError:
     raise
 
 OF_NO_ENVIRONMENT = ("compute_reward",)
-"""Methods whose results are the same for all environments, and change none."""
+"""Methods that change nothing and have the same result in all environments."""
 
 
 class RigidVecEnv(VecEnv):
@@ -135,7 +135,7 @@ class RigidVecEnv(VecEnv):
         self.set_options(None)
 
     def _option_groups(self) -> list[tuple[Sequence[int], dict[str, Any]]]:
-        """Environments that fix the same draws, and their options: a `reset` of the batch for each group."""
+        """Environments that fix the same draws, with their options; each group needs one `reset` of the batch."""
         groups: dict[frozenset, list[int]] = {}
         for i, one in enumerate(self._options):
             groups.setdefault(frozenset(one), []).append(i)

@@ -18,14 +18,14 @@ from rigid_env.tasks.goal import GoalTask
 KINDS = ("state", "pixels")
 
 ObsKind = Literal["state", "pixels"]
-"""One of `KINDS`."""
+"""Kind of observation, one of `KINDS`."""
 
 Obs = TypeVar("Obs")
-"""Observations of an environment: an array, or a dictionary of arrays where a task has goals."""
+"""Type of an observation: an array, or a dictionary of arrays where a task has goals."""
 
 
 class StateSource:
-    """Observations as a task's entries give them.
+    """Source of observations that hold the numbers of a task's entries.
 
     Parameters
     ----------
@@ -42,14 +42,14 @@ class StateSource:
         self.space = spaces.Box(task.observed.low, task.observed.high, dtype=np.float32)
 
     def start(self, rows: np.ndarray) -> None:
-        """Look at worlds whose episodes begin."""
+        """Observe worlds whose episodes begin."""
 
     def step(self) -> None:
-        """Look at all worlds after a step."""
+        """Observe all worlds after a step."""
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Memory of the source, by name, with the worlds first: none."""
+        """Memory of the source by name, worlds first: none."""
         return {}
 
     def one(self, world: int) -> np.ndarray:
@@ -62,7 +62,7 @@ class StateSource:
 
 
 class PixelSource:
-    """Pictures of the worlds as observations, without text and arrows.
+    """Source of observations that are pictures of the worlds, without text and arrows.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class PixelSource:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Memory of the source, by name, with the worlds first: the last pictures."""
+        """Memory of the source by name, worlds first: the last pictures."""
         return {"pictures": self._pictures}
 
     def _draw(self, world: int) -> None:
@@ -128,7 +128,7 @@ class PixelSource:
 
 
 def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> Any:
-    """Make the source of observations that an environment's arguments ask for.
+    """Make the source of observations for an environment's arguments.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Arguments of the native vector environments, looked at: autoreset mode, episode limit, reset mask, seeds."""
+"""Check arguments of the native vector environments: autoreset mode, episode limit, reset mask, seeds."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Autoreset = Literal["NextStep", "SameStep", "Disabled"]
 """Values of `AutoresetMode`."""
 
 NO_LIMIT = -1
-"""Value by which `gymnasium.make` leaves out the time limit; its None stands for the registered one."""
+"""Value with which `gymnasium.make` turns the time limit off; its None means the registered limit."""
 
 
 def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    """The mode, from its name, too."""
+    """Return the autoreset mode, given itself or by name."""
     try:
         return AutoresetMode(mode)
     except ValueError:
@@ -26,13 +26,13 @@ def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def episode_limit(value) -> int | None:
-    """Control steps of an episode; None, and -1 as of `gymnasium.make`: no limit."""
+    """Number of control steps of an episode; None and `gymnasium.make`'s -1 mean no limit."""
     is_off = isinstance(value, (int, np.integer)) and value == NO_LIMIT
     return None if is_off else checked_limit(value, "max_episode_steps")
 
 
 def reset_mask(options: dict[str, Any], num_envs: int) -> np.ndarray:
-    """The worlds to reset, (num_envs,) bool; taken out of `options`."""
+    """Worlds to reset, (num_envs,) bool; removes the mask from `options`."""
     mask = options.pop("reset_mask", None)
     if mask is None:
         return np.ones(num_envs, dtype=np.bool_)

@@ -232,7 +232,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
 
     @exclusive
     def get_state(self, worlds: ArrayLike | None = None) -> TaskState:
-        """Copy all that decides how episodes go on: `set_state` continues bit-identically, generators and all.
+        """Copy the whole state of all episodes, generators included; `set_state` continues it bit for bit.
 
         Parameters
         ----------
@@ -255,7 +255,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     def set_state(
         self, state: TaskState, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
     ) -> None:
-        """Let worlds go on from a state of this task, of an environment or of any batch.
+        """Continue worlds from a state of this task, of an environment or of any batch.
 
         Parameters
         ----------
@@ -296,10 +296,10 @@ class RigidVectorEnv(BatchAttributes[Obs]):
             )
 
     def _generators_of_ended(self) -> list[tuple[Any, Any]]:
-        """Generators of ended worlds, each with its state.
+        """Random generators of worlds whose episodes ended, each with its state.
 
-        In mode ``NextStep`` they move in the step that starts them anew; a disturbance due then must not take numbers
-        of the next episode.
+        In mode ``NextStep`` ended worlds move in the step that restarts them. A disturbance due in that step must not
+        use numbers of the next episode.
         """
         if self.task.disturbed is None:
             return []
@@ -331,7 +331,7 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     # --- pictures -----------------------------------------------------------------------------------------
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """A picture of each world, (height, width, 3) uint8; mode ``human`` shows world 0 and gives None."""
+        """Pictures of all worlds, (height, width, 3) uint8 each; mode ``human`` shows world 0 and returns None."""
         self._check_open("render")
         if self.render_mode is None:
             gym.logger.warn("render() needs a render_mode: pass render_mode='rgb_array' or 'human' to make_vec()")

@@ -17,7 +17,7 @@ def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """Infos that the last step or start left, of the worlds of `mask` (worlds,) bool; zero in the others."""
+    """Infos of the last step or start for the worlds of `mask` (worlds,) bool; zero in the others."""
     outcome = task.outcome
     infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
     for column, name in enumerate(task.info_names, col.INFO):
@@ -35,7 +35,7 @@ def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInf
 
 
 def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
-    """Add what was drawn for the episodes that begin in the worlds `rows` (n,); zero in the others."""
+    """Add the values drawn for episodes that begin in the worlds `rows` (n,); zero in the others."""
     mask = np.zeros(task.worlds, dtype=np.bool_)
     mask[rows] = True
     for name in task.own_draws:
@@ -46,7 +46,7 @@ def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
 
 
 def of_ended(task: Task, source, mask: np.ndarray, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """`final_obs` and `final_info` of the episodes that end where `mask` is True, before they start anew."""
+    """`final_obs` and `final_info` of episodes that end where `mask` is True, taken before they restart."""
     final_obs = np.full(task.worlds, None, dtype=object)
     for i in np.flatnonzero(mask):
         final_obs[i] = source.one(i)

@@ -61,7 +61,7 @@ class Demo:
         self._go_to(self._sample_count)
 
     def _go_to(self, sample: int) -> None:
-        """Take the world to a sample of the trajectory, with the same steps."""
+        """Advance the world to a sample of the trajectory, with the same steps."""
         if sample < self._sample:
             self.world.restore(self.start)
             self._sample = 0
@@ -72,7 +72,7 @@ class Demo:
     # --- numbers -------------------------------------------------------------------------------------------
 
     def events(self) -> list[dict]:
-        """List the events, equal ones at the same time counted."""
+        """List the events; equal ones at the same time are counted."""
         found: list[dict] = []
         for event in self.trajectory.events:
             content = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(event).items()}
@@ -84,7 +84,7 @@ class Demo:
         return found
 
     def summary(self) -> dict:
-        """Everything that is printed, JSON-able."""
+        """All printed numbers, ready for JSON."""
         trajectory, world = self.trajectory, self.world
         points, forces = world.contacts()
         energy = trajectory.energy.sum(axis=1)
@@ -137,7 +137,7 @@ class Demo:
 
     @property
     def speed(self) -> float:
-        """Simulated seconds that the GIF shows in one."""
+        """Simulated seconds that the GIF shows in one second."""
         return 1.0 if self.duration <= LARGEST_GIF * FRAME_TIME else self.frame_time / FRAME_TIME
 
     def write_picture(self, path: Path, tick: Callable[[], None] = lambda: None, shot: Shot = CHOSEN) -> None:
@@ -160,7 +160,7 @@ class Demo:
         write_gif(path, pictures, self.speed / self.frame_time)
 
     def write_png(self, path: Path, shot: Shot = CHOSEN) -> None:
-        """Draw and write the stroboscopic picture: where the bodies were, and how they end."""
+        """Draw and write the stroboscopic picture: earlier positions of the bodies, and the last one."""
         stage = self._stage()
         renderer = Renderer(*PICTURE_SIZE, camera=stage.camera(shot), bounds=stage.bounds)
         pictures = []
@@ -176,7 +176,7 @@ class Demo:
         renderer.close()
 
     def _last_motion(self) -> int:
-        """Last sample at which a body still moved in a way that one sees."""
+        """Last sample at which a body still moved visibly."""
         speed = np.maximum(np.abs(self.trajectory.linvel), np.abs(self.trajectory.angvel)).max(axis=(1, 2))
         moving = np.flatnonzero(speed > SEEN_SPEED)
         return int(moving[-1]) if len(moving) else 0

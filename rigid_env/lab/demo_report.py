@@ -1,4 +1,4 @@
-"""A run of a scene in words: events, energy, where the bodies are, and how well it was solved."""
+"""Report a run of a scene in words: events, energy, final places of the bodies, and quality of the solves."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
 
 
 def event_table(events: list[dict], names: list[str]) -> Table:
-    """The first events; `names` are those of the bodies, or their classes."""
+    """Table of the first events; `names` are those of the bodies, or their classes."""
     columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
     more = len(events) - SHOWN_EVENTS
     caption = f"{more} more are left out; --json has all" if more > 0 else ""
@@ -66,7 +66,7 @@ def _name_of(body: int, names: list[str]) -> str:
 
 
 def _partner(event: dict, names: list[str]) -> str:
-    """The wall or the other body that an event is about."""
+    """Wall or other body of an event."""
     return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], names)
 
 
@@ -91,7 +91,7 @@ def _body_table(final: dict, names: list[str]) -> Table:
 
 
 def _summarise(final: dict, kinds: list[str], names: list[str], console: Console) -> None:
-    """Print ranges in place of bodies, and the bodies that are fastest."""
+    """Print ranges instead of a row for each body, and the fastest bodies."""
     counts = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
     say(console, "bodies", ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     pos = np.array(final["pos"])
@@ -115,5 +115,5 @@ def _show_contacts(contacts: dict, console: Console) -> None:
 
 
 def _numbers(values) -> str:
-    """To four decimals, without negative zeros."""
+    """Numbers with four decimals, without negative zeros."""
     return ", ".join(f"{round(value, 4) + 0.0:.4f}" for value in values)

@@ -1,4 +1,4 @@
-"""A plan as a table in a terminal: what `rigid-env explain` shows."""
+"""Table of a plan in a terminal, for `rigid-env explain`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ STATES = {True: Text("on", style="green"), False: Text("off", style="dim")}
 
 
 def make_table(plan: Plan, title: str) -> Table:
-    """Effect, whether it is on, why, and what is compiled for it."""
+    """Table of effects: on or off, the reason, and the kernels compiled for each."""
     columns = [Column("effect"), Column("state", is_whole=True), Column("why"), Column("compiled", under="why")]
     table = Table(columns, title)
     for row in plan.rows:

@@ -1,4 +1,4 @@
-"""Command ``rigid-env replay``: takes a recording again, step by step."""
+"""Command ``rigid-env replay``: take the steps of a recording again, one by one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LAST_ROWS = 20
 
 
 def summary(replay: Replay) -> dict:
-    """The replay as numbers, JSON-able."""
+    """Numbers of the replay, ready for JSON."""
     recording, first = replay.recording, replay.first_difference
     return {
         "reason": recording.reason,
@@ -69,13 +69,13 @@ def make_table(rows: list[dict], shown: list[int]) -> Table:
 
 
 def _shown(rows: list[dict]) -> list[int]:
-    """Numbers of the rows that a table has."""
+    """Row numbers that a table shows."""
     last = len(rows) - LAST_ROWS
     return [k for k, row in enumerate(rows) if k >= last or row["status"] not in ("OK", "UNCONVERGED")]
 
 
 def _verdict(content: dict) -> str:
-    """Outcome in words."""
+    """Outcome of the replay in words."""
     if content["is_identical"]:
         return "bit for bit as recorded"
     ours, theirs = content["replayed_with"], content["recorded_with"]

@@ -1,4 +1,4 @@
-"""Command `rigid-env warmup`: one step of all common scenes and environments, to compile their kernels."""
+"""Command `rigid-env warmup`: take one step of all common scenes and environments, to compile their kernels."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def jobs() -> list[Job]:
 
 
 def warm(todo: list[Job]) -> Iterator[Warmed]:
-    """Run jobs one after the other; yields what each took."""
+    """Run jobs one after the other, and yield the time of each."""
     for job in todo:
         with backend.count_compilations() as count:
             start = time.perf_counter()

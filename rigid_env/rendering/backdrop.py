@@ -76,7 +76,7 @@ def _draw_wall(picture, rays, camera, room, index):
 
 
 def _fade(points, room):
-    """1 inside the room, falling smoothly to 0 at `room.fade` outside of it, measured round the corners."""
+    """Strength of an open floor: 1 inside the room, falling smoothly to 0 at `room.fade` outside of it."""
     outside = np.maximum(room.lower - points, 0.0) + np.maximum(points - room.upper, 0.0)
     outside[..., 1] = 0.0
     far = np.clip(np.linalg.norm(outside, axis=-1) / room.fade, 0.0, 1.0)
@@ -100,7 +100,7 @@ def _pixel_footprint(values):
 
 
 def _step(gap):
-    """Part of a pixel in which gap ≥ 0, to first order: the anti-aliased step."""
+    """Coverage of a pixel by gap ≥ 0, to first order: the anti-aliased step."""
     return np.clip(0.5 + gap / _pixel_footprint(gap), 0.0, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""A pinhole camera: world points to pixels and depths, and clipping to what it sees."""
+"""A pinhole camera: world points to pixels and depths, and clipping to the field of view."""
 
 from __future__ import annotations
 

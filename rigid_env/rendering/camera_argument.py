@@ -1,4 +1,4 @@
-"""Cameras and switches as arguments: what a caller gives, looked at before anything is drawn."""
+"""Check cameras and switches given as arguments, before anything is drawn."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ import numpy as np
 from rigid_env.rendering.camera import Camera
 
 CameraArgument = Camera | Mapping[str, Any] | None
-"""Camera, a mapping of its parameters such as ``{"eye": (0, 8, 20)}``, or None for the one that sees the room."""
+"""Type of the argument: a camera, a mapping of its parameters such as ``{"eye": (0, 8, 20)}``, or None for the default.
+"""
 
 ALONG = 1e-6
-"""Sine of the angle between `up` and the line of sight below which they are one direction."""
+"""Least sine of the angle between `up` and the line of sight; below it they count as one direction."""
 
 
 def as_camera(value: CameraArgument, field: str = "camera") -> Camera | None:
-    """Camera that an argument stands for, with its parameters checked; None for None.
+    """Camera of an argument, with its parameters checked; None for None.
 
     Parameters
     ----------
@@ -54,13 +55,13 @@ def as_camera(value: CameraArgument, field: str = "camera") -> Camera | None:
 
 
 def upwards(eye: Sequence[float], target: Sequence[float]) -> tuple[float, float, float]:
-    """Direction that is up in a picture: y, or -z where the camera looks along y."""
+    """Upward direction of a picture: y, or -z where the camera looks along y."""
     x, _, z = np.subtract(target, eye)
     return (0.0, 0.0, -1.0) if np.hypot(x, z) <= ALONG * np.linalg.norm(np.subtract(target, eye)) else (0.0, 1.0, 0.0)
 
 
 def as_switch(value: bool, field: str) -> bool:
-    """True or False.
+    """Return a switch as True or False.
 
     Raises
     ------

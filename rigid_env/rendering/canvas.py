@@ -44,7 +44,7 @@ class Canvas:
         return self.camera.project(points, self.size)
 
     def polygon(self, points, colour, alpha=255):
-        """Fill a convex world polygon (n, 3) [m], clipped to what is in sight; alpha 0..255."""
+        """Fill a convex world polygon (n, 3) [m], clipped to the field of view; alpha 0..255."""
         self.fill(self.camera.project_polygon(points, self.size), colour, alpha)
 
     def loop(self, points, width, colour):
@@ -74,7 +74,7 @@ class Canvas:
         return is_near.all(axis=(1, 2)) & (depths > NEAR).all(axis=1)
 
     def stored(self, colours):
-        """(n,) int64: sRGB colours (n, 3) int as the surface stores them, which are the fastest to draw with."""
+        """sRGB colours (n, 3) int as the surface stores them, (n,) int64, which is the fastest form to draw with."""
         return colours @ self._weights
 
     def fill(self, pixels, colour, alpha=255):

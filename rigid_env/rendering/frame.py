@@ -21,7 +21,7 @@ NO_POINTS.setflags(write=False)
 
 @dataclass(frozen=True, eq=False)
 class BodyView:
-    """One rigid body.
+    """Pose, shape and loads of one rigid body.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class GoalView:
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Everything in one picture.
+    """All contents of one picture.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class Frame:
 
     @property
     def has_arrows(self):
-        """bool. Whether there is a contact, or a force or torque is applied."""
+        """True if there is a contact, or a force or torque is applied."""
         return len(self.contact_points) > 0 or bool(np.any(self.applied_force)) or bool(np.any(self.applied_torque))
 
     @cached_property
@@ -245,5 +245,5 @@ def _set_array(view, name, shape):
 
 
 def _is_kept(array):
-    """True if nobody can change an array any more: it is read-only, and no view of another."""
+    """True if an array cannot change any more: it is read-only, and no view of another."""
     return type(array) is np.ndarray and array.dtype == np.float64 and not array.flags.writeable and array.base is None

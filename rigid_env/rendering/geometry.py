@@ -63,7 +63,7 @@ _ROTATION = np.array(
     ],
     dtype=np.float64,
 )
-"""(10, 9). Entries of the rotation matrix, row by row, in these products."""
+"""Coefficients (10, 9) of the rotation matrix's entries, row by row, in these products."""
 
 
 def unit_vectors(vectors):

@@ -1,4 +1,4 @@
-"""Part of the endless walls to show, and viewpoint: a room around the scene and its camera."""
+"""Choose the visible part of the endless walls, and the viewpoint: a room around the scene and its camera."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def faces_point(wall, point):
 
 
 def make_room(walls, bodies, bounds=None):
-    """Room between the walls; where there are none, as large as the bodies need.
+    """Room between the walls; where there are none, large enough for the bodies.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from operator import itemgetter
 import numpy as np
 
 SPHERE_SUBDIVISIONS = 12
-"""Each face of the octahedron becomes its square in triangles (8 · 144 in all): round to the eye."""
+"""Subdivisions of an octahedron's face, which becomes their square in triangles (8 · 144 in all): round to the eye."""
 
 BLOCK_FACES = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
@@ -49,17 +49,17 @@ class Mesh:
 
     @cached_property
     def corner_getters(self):
-        """List of a function for each face, that takes the corners out of a list of the vertices."""
+        """Functions that take the corners of each face out of a list of the vertices."""
         return [itemgetter(*face) for face in self.faces.tolist()]
 
     @cached_property
     def is_odd_octant(self):
-        """(m,) bool. Faces in every second octant of the body frame."""
+        """Faces (m,) bool in every second octant of the body frame."""
         return np.prod(self.centres, axis=1) < 0.0
 
 
 def body_mesh(body):
-    """Mesh of a `BodyView`; made once for each shape.
+    """Mesh of a `BodyView`, made once for each shape.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def block_mesh(size):
 def hull_mesh(corners, polygons):
     """Convex polyhedron of `corners` (n tuples of 3) [m] with `polygons`, tuples of corners; see `BodyView`.
 
-    A polygon becomes triangles, which are all the same size; what they have between them is no edge.
+    Each polygon is cut into a fan of triangles; sides between two triangles of a polygon are no edges.
     """
     faces, of_side = [], {}
     for polygon in polygons:
@@ -121,7 +121,7 @@ def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
 
 
 def patched_sphere(subdivisions):
-    """Sphere of radius 1: the triangles of `ellipsoid_mesh`, two by two as quadrangles, which are half as many to draw.
+    """Sphere of radius 1 with the triangles of `ellipsoid_mesh` in pairs as quadrangles: half as many faces to draw.
 
     Their corners are nearly in a plane; the normal is that of the two diagonals. A triangle that is left alone has its
     last corner twice.
@@ -165,7 +165,7 @@ def _triangles(n):
 
 
 def _squares(n):
-    """The same grid in squares; along i + j = n are triangles, with the last corner twice."""
+    """Squares of the same grid; along i + j = n are triangles, with the last corner twice."""
     for i in range(n):
         for j in range(n - i):
             far = (i + 1, j + 1) if i + j + 2 <= n else (i, j + 1)

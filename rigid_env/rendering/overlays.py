@@ -26,7 +26,7 @@ TORQUE_SWEEP = np.radians(300.0)
 """[rad]. Largest angle of a torque's arc."""
 
 AXIS_WIDTH = 1.8
-"""[units] of the canvas. Of the line along a torque's axis."""
+"""[units] of the canvas. Width of the line along a torque's axis."""
 
 PATH_WIDTH = 2.2
 """[units] of the canvas."""
@@ -58,7 +58,7 @@ def draw_goal(canvas, goal, room):
 
 
 def draw_path(canvas, frame, room):
-    """Path of a body, and the same on the floors of a `Room` below it."""
+    """Draw the path of a body, and its projection onto the floors of a `Room` below it."""
     if len(frame.path) < 2:
         return
     for wall in room.walls:
@@ -94,7 +94,7 @@ def draw_wrench(canvas, frame, room):
 
 
 def draw_arrow(canvas, start, vector, colour):
-    """Arrow on top of what is there.
+    """Draw an arrow over all that is already drawn.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def has_near_walls(camera, room):
 
 
 def draw_near_walls(canvas, room):
-    """Walls between camera and scene: an outline and a breath of colour, in front of everything."""
+    """Draw walls between camera and scene as an outline and a faint tint, in front of everything."""
     for index, wall in enumerate(room.walls):
         polygon = room.wall_polygons[index]
         if len(polygon) >= 3 and not faces_point(wall, canvas.camera.eye):
@@ -191,7 +191,7 @@ def _draw_torque(canvas, body, scaled):
 
 
 def _axes_towards(canvas, centre, normal):
-    """Axes of the plane of `normal`, the first as near to the camera's direction as it can be."""
+    """Axes of the plane of `normal`, the first as close as possible to the camera's direction."""
     sight = np.asarray(canvas.camera.eye) - centre
     u = sight - (sight @ normal) * normal
     if np.linalg.norm(u) < 1e-3 * np.linalg.norm(sight):
@@ -227,7 +227,7 @@ def _arrow_line(canvas, pixels, colour):
 
 
 def _cut_back(pixels, lengths, cut):
-    """The line without its last `cut` pixels, and where it now ends."""
+    """Line without its last `cut` pixels, and its new end."""
     keep = len(lengths)
     while keep > 1 and lengths[keep - 1] <= cut:
         cut -= lengths[keep - 1]

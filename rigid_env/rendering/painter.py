@@ -1,4 +1,4 @@
-"""Frames onto a picture in memory: the stages of drawing, in order, and what is kept from one frame to the next."""
+"""Draw frames onto a picture in memory: the stages of drawing in order, and a cache of unchanging parts."""
 
 from __future__ import annotations
 
@@ -27,21 +27,22 @@ from rigid_env.rendering.shadow_layer import LitWall, ShadowLayer, lit_walls
 
 BODY_STAGES = (draw_path, draw_bodies)
 ARROW_STAGES = (draw_contacts, draw_wrench)
-"""Drawn in this order on the canvas, each a function of canvas, frame and room."""
+"""Stages that draw arrows, in order; each is a function of canvas, frame and room."""
 
 LINE_REACH = 3.0
-"""[px] at 600 px of height, and in smaller pictures. No line of a body reaches further beyond it."""
+"""[px] at 600 px of height, and in smaller pictures. Largest distance of a body's line from the body."""
 
 SMALL = 20_000
-"""Pixels of a picture that is always drawn whole: that takes less time than to find the part with the bodies."""
+"""Number of pixels up to which a picture is drawn whole, as this takes less time than to find the part with the bodies.
+"""
 
 KEPT_PIXELS = 5_000_000
-"""Pixels of kept backdrops in all: of eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
+"""Number of pixels in all cached backdrops: eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Everything in a picture that does not move.
+    """Unmoving parts of a picture.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ class Painter:
         self._settings = OrderedDict()
 
     def _surface(self, size, layout):
-        """Array (height, width, 4) uint8 and the surface of the same memory.
+        """Picture array (height, width, 4) uint8, and a surface on the same memory.
 
         Surfaces whose colours are stored in the same order are blended ten times as fast.
         """
@@ -127,7 +128,7 @@ class Painter:
         self._pygame.image.frombuffer(out, self.size, "RGB").blit(self.picture, (0, 0))
 
     def setting(self, frame):
-        """`Setting` of a frame, kept for later ones with the same walls, shapes and goal."""
+        """`Setting` of a frame, cached for later frames with the same walls, shapes and goal."""
         key = self._key(frame)
         setting = self._settings.get(key)
         if setting is None:
@@ -189,13 +190,13 @@ class Painter:
         return whole.clip((*low.tolist(), *(high - low).tolist()))
 
     def _enlarged(self, camera, box=None):
-        """Canvas with a part of the picture on it, or all."""
+        """Canvas with all or a part of the picture."""
         small, large = self._parts(box)
         self._pygame.transform.scale(small, large.get_size(), large)
         return Canvas(self._canvas, camera, self._pygame)
 
     def _reduce(self, box=None):
-        """Canvas back to the picture, each pixel the mean of its parts."""
+        """Reduce the canvas to the picture, each pixel the mean of its parts."""
         small, large = self._parts(box)
         self._pygame.transform.smoothscale(large, small.get_size(), small)
 
@@ -206,7 +207,7 @@ class Painter:
 
 
 def import_pygame():
-    """pygame, with `gfxdraw`; an error that names the extra where it is missing."""
+    """Import pygame, with `gfxdraw`; an error names the extra where it is missing."""
     require("render", "pygame", purpose="rendering")
     import pygame
     import pygame.gfxdraw

@@ -1,4 +1,4 @@
-"""Colours, the light, and how a surface looks in it."""
+"""Colours, the light, and the shading of surfaces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WALL_OUTLINE = (124, 141, 168)
 SHADOW = (38, 50, 78)
 
 BODIES = ((58, 118, 222), (238, 150, 60), (46, 160, 140), (150, 104, 208))
-"""Of bodies without a colour of their own, in turn."""
+"""Colours of bodies without a colour of their own, in turn."""
 
 CONTACT = (222, 52, 60)
 PATH = (92, 140, 220)
@@ -55,7 +55,8 @@ def to_srgb(intensity):
 _LINEAR = to_linear(np.arange(256))
 _SRGB_STEPS = 65535
 _SRGB = to_srgb(np.arange(_SRGB_STEPS + 1) / _SRGB_STEPS)
-"""Tables of both, as powers take long; 255 · 12.92 / 65535 = 0.05 of a level between two entries, at most."""
+"""Tables of both conversions, as powers take long; neighbours differ by 255 · 12.92 / 65535 = 0.05 of a level at most.
+"""
 
 
 def shade(colours, normals, towards_eye):

@@ -31,7 +31,7 @@ def world_frame(
     applied: np.ndarray | None = None,
     arrows: bool = True,
 ) -> Frame:
-    """Make the frame to draw of one world now.
+    """Make a frame of the present state of one world.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _body_view(world: World, index: int, body: int) -> BodyView:
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:
-    """The same frame with all bodies behind the camera and no contacts: what does not move."""
+    """Frame with all bodies behind the camera and no contacts: its unmoving parts."""
     eye, target = np.array(camera.eye), np.array(camera.target)
     behind = eye + FAR_BEHIND * (eye - target)
     bodies = tuple(replace(body, pos=behind) for body in frame.bodies)

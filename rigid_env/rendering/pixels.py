@@ -1,4 +1,4 @@
-"""Pixel observations: pictures of worlds, one after the other, written into arrays that the caller keeps."""
+"""Pixel observations: pictures of worlds, one after the other, written into the caller's arrays."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigid_env.rendering.picture import world_frame
 
 
 class PixelObserver:
-    """Writes pictures without text, and without arrows unless they are wanted, into arrays.
+    """Writer of pictures without text, and by default without arrows, into arrays.
 
     One observer draws any number of worlds. The picture depends on nothing but the frame: equal states give equal
     pixels, whatever was drawn before. No window or display is needed. A pickled observer draws the same pictures: it

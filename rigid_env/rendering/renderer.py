@@ -1,4 +1,4 @@
-"""Frames to pixels: the order of drawing, the picture in memory, and the window if one is wanted."""
+"""Turn frames into pixels: the order of drawing, the picture in memory, and an optional window."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ class Renderer:
 
     @property
     def is_open(self):
-        """bool. Whether a window is shown; False before the first frame and once the user has closed it."""
+        """True while a window is shown; False before the first frame and after the user has closed it."""
         return self._window is not None
 
     def draw(self, frame):
-        """Draw a frame; in human mode show it and wait until it is due.
+        """Draw a frame; in human mode show it and wait for its time.
 
         Parameters
         ----------
@@ -97,11 +97,11 @@ class Renderer:
         return pixels
 
     def camera(self, frame):
-        """`Camera` that `draw(frame)` looks through; its `project(points, (width, height))` gives pixels."""
+        """`Camera` of `draw(frame)`; its `project(points, (width, height))` gives pixels."""
         return self._painter.setting(frame).camera
 
     def close(self):
-        """Close the window, if any. May be called again."""
+        """Close the window, if any; further calls do nothing."""
         self._is_closed = True
         self._close_window()
 

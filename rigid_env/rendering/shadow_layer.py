@@ -1,4 +1,4 @@
-"""Shadows in a picture: counts, pixel by pixel, of the samples of the sun that are hidden."""
+"""Shadows in a picture: each pixel counts the samples of the sun that are hidden from it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ COARSE_HEIGHT = 400
 
 COVER_SIDE = 2
 COVER = COVER_SIDE**2
-"""Parts of a pixel, along each side and in all, of which each belongs to one wall or none."""
+"""Parts of a pixel, along each side and in all; each part belongs to one wall or none."""
 
 JITTER = np.arange(1, SAMPLES + 1)[:, None] * (0.7548776662, 0.5698402910) % 1.0 - 0.5
 """(SAMPLES, 2) [px]. Offset of each sample's polygons, spread evenly over a pixel (the R2 sequence, Roberts 2018):
@@ -151,7 +151,7 @@ class ShadowLayer:
     def _add_wall(self, camera, lit, poses, groups):
         """Count the samples that are dark on one wall; returns the rows of pixels that it may have darkened, or None.
 
-        Whole rows are added up: they are contiguous, which is worth more than leaving out their ends.
+        Whole rows are added up, since contiguous memory saves more time than skipping the rows' ends.
         """
         may_show = _may_show(lit, poses)
         drawn = []
@@ -169,7 +169,7 @@ class ShadowLayer:
         return top, bottom
 
     def _count_samples(self, drawn, mask, count):
-        """Draw the polygons of a sample, add up, wipe, and go on to the next sample."""
+        """Draw the polygons of a sample, add up, clear, and continue with the next sample."""
         draw, surface = self._pygame.draw.polygon, self._mask_surface
         count.fill(0)
         for _ in range(SAMPLES):
@@ -203,7 +203,7 @@ class ShadowLayer:
         return found
 
     def _clip(self, camera, loops):
-        """The same of one body, of which only a part is in sight."""
+        """Clip the polygons of one body that is only partly in sight."""
         clipped = [np.floor(camera.project_polygon(loop, self.size) + shift) for loop, shift in zip(loops, JITTER)]
         y = np.concatenate([polygon[:, 1] for polygon in clipped])
         low, high = (int(y.min()), int(y.max())) if len(y) else (0, -1)

@@ -1,4 +1,4 @@
-"""Soft shadows of convex bodies on walls: a sun with a disc, sampled; sharp where they touch, soft above.
+"""Soft shadows of convex bodies on walls: sharp at contacts, soft above, from samples of a sun with a disc.
 
 Every sample of the sun is a light of its own: the `outlines` of the bodies along it `fall` onto a wall as convex
 polygons. `shadow_layer` draws them.
@@ -39,7 +39,7 @@ _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
 
 def outlines(frame):
-    """Outlines of the bodies of a frame along the lights of the sun, those of like bodies together.
+    """Outlines of a frame's bodies along the lights of the sun, bodies of one shape together.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def _block_outlines(pos, R, size):
 
 
 def _round_outlines(pos, R, size):
-    """One loop for all lights.
+    """Outline of a round body: one loop for all lights.
 
     On an ellipsoid x = R A u, |u| = 1, light grazes where its normal R A⁻¹ u is perpendicular to the light: the great
     circle of u perpendicular to A⁻¹ Rᵀ light.
@@ -83,7 +83,7 @@ def _round_outlines(pos, R, size):
 
 
 def _hull_outlines(body, R):
-    """Hulls of the corners in the planes perpendicular to the lights: moved along the light they fall alike."""
+    """Outlines of hulls: hulls of their corners in the planes perpendicular to the lights."""
     corners = body.pos + body_mesh(body).vertices @ R.T
     loops = []
     for light in SUN_SAMPLES:

@@ -1,4 +1,4 @@
-"""Bodies before the camera: the meshes of all bodies posed, lit and projected, those of one shape at once."""
+"""Pose, light and project the meshes of all bodies before the camera, bodies of one shape at once."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from rigid_env.rendering.geometry import perpendiculars, unit_vectors
 from rigid_env.rendering.meshes import Mesh, body_mesh, unit_mesh
 
 OCTANT_LIGHTENING = 0.42
-"""Every second octant of a round body is lighter, so that its rotation can be seen."""
+"""Lightening of every second octant of a round body, which makes its rotation visible."""
 
 FACET, FEW = 8.0, 16
-"""[px] of the picture. A round body gets so many facets that none is longer, within `SUBDIVISIONS`. With more than
-`FEW` round bodies the length grows, so that there are as many facets in all."""
+"""[px] of the picture. Longest facet of a round body, within `SUBDIVISIONS`, and number of bodies up to which it holds.
+With more than `FEW` round bodies the length grows, so that the number of all facets stays."""
 
 SUBDIVISIONS = (4, 6, 8, 10, 12)
-"""Of a round body's mesh, see `meshes.SPHERE_SUBDIVISIONS`: coarse where the body is small in the picture."""
+"""Subdivisions of a round body's mesh (`meshes.SPHERE_SUBDIVISIONS`); coarse where the body is small in the picture."""
 
 RIM_POINTS = 32
-"""Of the outline of a round body."""
+"""Number of points in the outline of a round body."""
 
 _ANGLES = 2.0 * np.pi * np.arange(RIM_POINTS)[:, None] / RIM_POINTS
 _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
@@ -30,7 +30,7 @@ _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """One body as the camera sees it.
+    """One body in the camera's view.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def pose(canvas, frame, colours, rim_width, face_tint=None):
 
 
 def _meshes(canvas, bodies, depths):
-    """Unit mesh of each body; of a hull, its own."""
+    """Unit mesh of each body; hulls have their own."""
     focal = canvas.camera.focal(canvas.size[1]) / canvas.scale
     count = sum(body.kind in ("sphere", "ellipsoid") for body in bodies)
     facet = FACET * max(1.0, count / FEW) ** 0.5
@@ -108,7 +108,7 @@ def _meshes(canvas, bodies, depths):
 
 
 def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
-    """Solids of the bodies that share a mesh."""
+    """Make the solids of bodies that share a mesh."""
     eye = np.array(canvas.camera.eye)
     pos, R, size = (array[members] for array in (frame.poses.pos, frame.poses.rotation, frame.poses.size))
     turned = np.swapaxes(R, 1, 2)
@@ -135,7 +135,7 @@ def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
 
 
 def _light(canvas, mesh, normals, towards_eye, is_visible, colours, face_tint):
-    """(n, f) int colours of the visible faces in the light, as the canvas stores them."""
+    """Lit colours (n, f) int of the visible faces, as the canvas stores them."""
     body, face = np.nonzero(is_visible)
     surface = colours[body]
     if mesh.is_smooth:

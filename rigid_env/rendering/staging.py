@@ -1,4 +1,4 @@
-"""Put a motion before the camera: upright, at a size that can be drawn, and all of it in sight."""
+"""Place a motion before the camera: upright, at a size that can be drawn, and all of it in sight."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Shot:
 
 
 CHOSEN = Shot()
-"""All of the motion in sight."""
+"""View of all of the motion."""
 
 
 class Stage:
@@ -90,7 +90,7 @@ class Stage:
             self._show_flight(frame, np.asarray(pos)[:, 0] @ self._matrix.T)
 
     def _show_flight(self, frame: Frame, path: np.ndarray) -> None:
-        """Show all of a flight along `path` (samples, 3) [m]: with walls near it, the body as large as can be seen."""
+        """Show all of a flight along `path` (samples, 3) [m]; near walls, enlarge the body as far as possible."""
         lower, upper = path.min(axis=0), path.max(axis=0)
         span, size = float((upper - lower).max()), _extent(frame.bodies[0])
         cell = _round_up(span / FLIGHT_CELLS)
@@ -107,7 +107,7 @@ class Stage:
         self.notes = (f"grid {cell:g} m{larger}" if self._ground else f"flight {span:.3g} m across{larger}",)
 
     def place(self, frame: Frame, share: float = 1.0) -> Frame:
-        """A frame of the motion as it is drawn.
+        """Place a frame of the motion for drawing.
 
         Where one body goes far, its path is in the picture, the first `share` of it (0 to 1). Where several go too far
         to be shown whole, the picture is without walls and travels with body 0.
@@ -129,7 +129,7 @@ class Stage:
         )  # fmt: skip
 
     def camera(self, shot: Shot) -> Camera | None:
-        """Camera of a shot, in the frame of `place`, with what is up in the scene upwards; None where none is chosen.
+        """Camera of a shot, in the frame of `place`, with the scene's up direction upwards; None where none is chosen.
 
         Without a target it looks at the middle of the motion. Where the picture travels with body 0, both places are
         counted from it.
@@ -170,7 +170,7 @@ def _round_up(length: float) -> float:
 
 
 def _thinned(path: np.ndarray, share: float) -> np.ndarray:
-    """First `share` of a path, in at most `PATH_POINTS` points; its last one is there."""
+    """First `share` of a path as at most `PATH_POINTS` points, its end included."""
     last = round(share * (len(path) - 1))
     return path[np.unique(np.linspace(0, last, min(last + 1, PATH_POINTS)).round().astype(int))]
 
@@ -180,7 +180,7 @@ def _extent(body: BodyView) -> float:
 
 
 def _upright(scene: Scene) -> np.ndarray:
-    """Quaternion (4,) of the turn that takes the axis nearest to up onto y; none where y is, or nothing pulls."""
+    """Quaternion (4,) of the turn of the axis nearest to up onto y; none if that is y, or without gravity."""
     gravity = scene.effect(Gravity)
     up = -np.asarray(gravity.acceleration) if gravity is not None else Y
     k = int(np.abs(up).argmax())

@@ -1,4 +1,4 @@
-"""From a task to a picture: what of a world is drawn, and the renderer that draws it."""
+"""Pictures of a task: the frame of each world, and the renderer that draws it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
 
 
 def room_of(task: Task) -> Room:
-    """Part of space that pictures of a task show: the same for all its worlds and episodes."""
+    """Part of space shown in pictures of a task, the same for all its worlds and episodes."""
     frame = world_frame(task.world, arrows=False)
     return make_room(frame.walls, frame.bodies, bounds_of(task.world.scene))
 
@@ -55,7 +55,7 @@ def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner (3,) [m] of a box around a body: that of its own box, or that of a sphere around it."""
+    """Corners (3,) [m] of the box around a body: its own box, or that of its bounding sphere."""
     rotation = rotation_matrix(np.array(body.quat))
     reach = np.minimum(np.abs(rotation) @ body.dimensions, body.bounding_radius(body.dimensions))
     middle = np.array(body.pos) + rotation @ np.array(body.center)
@@ -63,7 +63,7 @@ def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 
 class View:
-    """Draws worlds of a task; the renderer is made with the first picture and is left out of pickles.
+    """View of a task's worlds; makes its renderer with the first picture, and leaves it out of pickles.
 
     Parameters
     ----------
@@ -109,14 +109,14 @@ class View:
         self._renderer: Renderer | None = None
 
     def draw(self, task: Task, world: int = 0) -> np.ndarray:
-        """(height, width, 3) uint8 picture of one world; in mode "human" it is shown in the window, too."""
+        """Picture (height, width, 3) uint8 of one world; mode "human" shows it in the window, too."""
         if self._renderer is None:
             bounds = bounds_of(task.world.scene)
             self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera, bounds)
         return self._renderer.draw(frame_of(task, world, self.arrows))
 
     def close(self) -> None:
-        """Close the window, if any. May be called again."""
+        """Close the window, if any; further calls do nothing."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None

@@ -1,4 +1,4 @@
-"""Ways to act upon bodies: from numbers between -1 and 1 to forces, torques and impulses.
+"""Actions on bodies: convert numbers between -1 and 1 to forces, torques and impulses.
 
 An action is a row of numbers. Each way that a task declares takes the next of them, and makes one or two vectors: their
 entries are clipped to ±1, then a vector is shortened to length 1 where it is longer, and multiplied by its limit.
@@ -48,19 +48,19 @@ class Vector(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Names of its numbers, for tables."""
+        """Names of the vector's numbers, for tables."""
         what = {FORCE: "force along", TORQUE: "torque about", IMPULSE: "impulse along"}[self.kind]
         axes = "" if self.frame == "world" else "body axis "
         return [f"{what} {axes}{axis}" for axis in self.axes]
 
     @property
     def unit(self) -> str:
-        """Unit of its numbers, for tables: m mass of the body, g gravity, a its reach."""
+        """Unit of the vector's numbers, for tables: m mass of the body, g gravity, a its reach."""
         return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
 
     @property
     def text(self) -> str:
-        """All of it in words, with every digit of its numbers."""
+        """Description of the vector in words, with all digits of its numbers."""
         what = {FORCE: "force", TORQUE: "torque", IMPULSE: "impulse"}[self.kind]
         at = "" if self.point is None else f" at {self.point}"
         return f"{what} {self.share!r} on body {self.body} along {self.axes} of the {self.frame} frame{at}"
@@ -110,7 +110,7 @@ class Wrench:
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
-        """The force and the torque, without those whose limit is 0."""
+        """Force and torque, without those whose limit is 0."""
         both = (
             Vector(FORCE, self.body, self.force_axes, float(self.force), self.frame),
             Vector(TORQUE, self.body, self.torque_axes, float(self.torque), self.frame),
@@ -262,7 +262,7 @@ class ActionTable:
         self.agents = {agent: np.array(places) for agent, places in agents.items()}
 
     def limits(self, weight: np.ndarray, reach: np.ndarray, first_dt: float) -> np.ndarray:
-        """Longest vectors.
+        """Largest lengths of the vectors.
 
         Parameters
         ----------

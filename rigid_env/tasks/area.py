@@ -1,4 +1,4 @@
-"""The two layouts of walls, and the part of the floor on which blocks start and goals lie."""
+"""The two layouts of walls, and the part of the floor for starts and goals."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.annotations import Layout
 LAYOUTS = ("three", "corner")
 
 CLEARANCE = 0.25
-"""[m] Between a wall and a block that turns about its centre on the floor."""
+"""[m] Gap between a wall and a block that turns about its centre on the floor."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Area:
         return self.half_width if self.walls == "corner" else 0.0
 
     def check_room(self, size: np.ndarray, option: str | None = None) -> None:
-        """Raise a ValueError, about an `option` if there is one, if a block of edges `size` (3,) has no room."""
+        """Raise a ValueError, which names an `option` if there is one, if a block of edges `size` (3,) does not fit."""
         radius = 0.5 * float(np.linalg.norm(size))
         if not self.half_width > radius + CLEARANCE:
             if option is not None:
@@ -68,7 +68,7 @@ class Area:
             )
 
     def spread(self, shares: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Places (x, z) at which a block is clear of the walls however it is turned.
+        """Places (x, z) at which a block is clear of the walls at any turn about the vertical.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""A task before a control step, to go back to where a function of the user's ends with an error."""
+"""Copy of a task before a control step, to restore it when a user's function raises an error."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 class Before:
-    """All that a control step changes, kept in arrays that are there for it.
+    """Arrays for a copy of all that a control step changes.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Before:
             self._generators = {world: task.generators[world].bit_generator.state for world in due}
 
     def put_back(self) -> None:
-        """Be as it was when `keep` was called."""
+        """Restore the state at the last `keep`."""
         task = self._task
         for array, kept in self._kept:
             array[...] = kept

@@ -20,12 +20,12 @@ from rigid_env.tasks.parameters import LENGTHS, Edges, Number, middle, parse_ran
 from rigid_env.tasks.task import Task
 
 FORCE_SHARE = 0.9
-"""Longest force over the block's weight m g: less than 1, so that the agent cannot fly."""
+"""Largest force over the block's weight m g: less than 1, so that the agent cannot fly."""
 
 TORQUE_SHARE = 0.5
-"""Longest torque over m g times the longest half edge. To tip the block a torque alone must exceed m g times
-the half edge that the centre has to pass over: this one tips the 5 x 3 x 2 m block when that is its shortest,
-and is too weak for the others without the force's help, momentum, or a wall."""
+"""Largest torque over m g times the longest half edge. To tip the block, a torque alone must exceed m g times the half
+edge that its centre has to pass over. The default tips the 5 x 3 x 2 m block over its shortest half edge. It is too
+weak for the others without the force's help, momentum, or a wall."""
 
 
 class BlockTask(Task):

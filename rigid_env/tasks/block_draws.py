@@ -58,7 +58,7 @@ class Face(Choice):
 
 
 class OtherFace(Face):
-    """A face of the block other than `face`, the one that is down at the start."""
+    """A face of the block other than `face`, the lower face at the start."""
 
     uniforms = 2  # of which one is used: seeds of earlier versions mean the same episodes
 
@@ -70,7 +70,7 @@ class OtherFace(Face):
 
 
 class EdgesInside(Distribution):
-    """Edges of a block that has room to turn in the area [m].
+    """Edges of a block that can turn inside the area [m].
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ BOUND = 10.0  # of numbers in observations
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
-    """(n,) lengths of (n, 3) vectors."""
+    """Lengths (n,) of vectors (n, 3)."""
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
@@ -25,7 +25,7 @@ REST = (
     Entry("speed", "m/s", 0.0, BOUND, lambda worlds: _length(worlds.linvel[:, 0])),
     Entry("spin", "rad/s", 0.0, BOUND, lambda worlds: _length(worlds.angvel[:, 0])),
 )
-"""How fast the block moves: the last two numbers of a goal, 0 in the one that is wanted."""
+"""Speed and spin of the block: the last two numbers of a goal, 0 in a desired one."""
 
 MOTION = (
     observe.height(scale=2.5),
@@ -43,13 +43,13 @@ class BlockGoal(GoalTask, BlockTask):
         super().__init__(worlds, reward=reward, frame_skip=frame_skip, **settings)
 
     def shortfall(self, achieved, desired):
-        """Largest of three: miss of the goal, difference of speed and of spin, each over its tolerance."""
+        """Largest of three quotients by their tolerances: miss of the goal, difference of speed, difference of spin."""
         speed, spin = (np.abs(achieved[..., k] - desired[..., k]) for k in (-2, -1))
         miss = self.miss(achieved[..., :-2], desired[..., :-2])
         return np.maximum(miss, np.maximum(speed / REST_SPEED, spin / REST_SPIN))
 
     def miss(self, achieved, desired) -> np.ndarray:
-        """(...,) distance or angle between goals over its tolerance."""
+        """Distance or angle (...,) between goals over its tolerance."""
         raise NotImplementedError
 
 
@@ -71,7 +71,7 @@ class BlockReachGoal(BlockGoal):
         return OnFloor(self.area)
 
     def desired(self, worlds):
-        """The place that was drawn, at rest."""
+        """Drawn place, at rest."""
         return np.pad(worlds.drawn["goal"], ((0, 0), (0, 2)))
 
     def miss(self, achieved, desired):
@@ -102,11 +102,11 @@ class BlockReorientGoal(BlockGoal):
     goal_draw = "target_face"
 
     def goal(self):
-        """Any face but the one that is down."""
+        """Any face other than the lower one."""
         return OtherFace()
 
     def desired(self, worlds):
-        """Outward normal of the face that was drawn, body frame, at rest."""
+        """Outward normal of the drawn face, body frame, at rest."""
         faces = worlds.drawn["target_face"].astype(np.int64)
         wanted = np.zeros((len(worlds), 5))
         wanted[np.arange(len(worlds)), faces // 2] = np.where(faces % 2 == 1, 1.0, -1.0)

@@ -9,7 +9,7 @@ from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.block_draws import OnFloor
 
 MARK_RADIUS = 1.0
-"""[m] Of the goal's disc, to be seen beside a block that covers its tolerance."""
+"""[m] Radius of the goal's disc, large enough to show beside a block that covers its tolerance."""
 
 
 class BlockReach(BlockTask):

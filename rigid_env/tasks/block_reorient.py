@@ -24,7 +24,7 @@ class BlockReorient(BlockTask):
     compiled = staticmethod(kernels.observe_reorient)
 
     def goal(self):
-        """Any face but the one that is down."""
+        """Any face other than the lower one."""
         return OtherFace()
 
     def note_episodes(self, rows, values):

@@ -1,4 +1,4 @@
-"""Names that a compiled task needs: `kernel`, and the places of numbers in the arrays that it gets.
+"""Names for compiled tasks: `kernel`, and the columns of the arrays that it gets.
 
 ``Task.compiled`` is a kernel that takes ``(taken, state, record, walls, actions, obs, outcome)``; docs/tasks.md has the
 arrays and a whole task.

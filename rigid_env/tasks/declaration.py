@@ -48,15 +48,15 @@ class Declaration:
     record_size: ClassVar[int] = 0
 
     def declared_draws(self) -> Mapping[str, Any]:
-        """Distributions of the task, by name: `draws`, unless arguments of the task decide."""
+        """Distributions of the task by name: `draws`, or distributions from the task's arguments."""
         return self.draws
 
     def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
-        """The scene of all worlds: `scene`, unless arguments of the task decide."""
+        """Scene of all worlds: `scene`, or one made from the task's arguments."""
         return self.scene
 
     def place(self, drawn: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
-        """Say where bodies start.
+        """Return the starting poses of bodies.
 
         Parameters
         ----------
@@ -66,8 +66,8 @@ class Declaration:
         Returns
         -------
         dict
-            Of ``pos``, ``quat``, ``linvel`` and ``angvel``, (n, bodies, 3|4|3|3), of one body also (n, 3|4|3|3), or
-            one for all. What is left out is the scene's.
+            Of ``pos``, ``quat``, ``linvel`` and ``angvel``, (n, bodies, 3|4|3|3), of one body also (n, 3|4|3|3), or one
+            for all. Arrays that are left out are the scene's.
         """
         return {}
 
@@ -75,7 +75,7 @@ class Declaration:
         """Prepare `memory` for episodes that begin; it is zero before."""
 
     def note_episodes(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
-        """Write draws into `record`, where a compiled function finds them; NumPy functions need none of it.
+        """Write draws into `record`, where a compiled function finds them; NumPy functions do not need it.
 
         Parameters
         ----------
@@ -86,14 +86,14 @@ class Declaration:
         """
 
     def update(self, worlds: Worlds) -> None:
-        """Look at the worlds first in a control step, to change `memory`."""
+        """Change `memory` from the state of the worlds, first in a control step."""
 
     def success(self, worlds: Worlds) -> np.ndarray:
-        """(n,) bool: the task is solved, which ends the episode unless `ends_on_success` is False."""
+        """Worlds (n,) bool that have solved the task, which ends the episode unless `ends_on_success` is False."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def failure(self, worlds: Worlds) -> np.ndarray:
-        """(n,) bool: it cannot be solved any more, which ends the episode, too."""
+        """Worlds (n,) bool that cannot solve the task any more, which ends the episode, too."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def rewards(self, worlds: Worlds) -> Mapping[str, np.ndarray]:
@@ -101,11 +101,11 @@ class Declaration:
         return {}
 
     def measure(self, worlds: Worlds) -> Mapping[str, np.ndarray]:
-        """Numbers (n,), by name, for `info` and for the functions below: they find them in `worlds.measured`."""
+        """Numbers (n,) by name for `info`, and for the functions below as `worlds.measured`."""
         return {}
 
     def goal_mark(self, world: int) -> Mapping[str, Any] | None:
-        """Say how the goal of one world is drawn in pictures.
+        """Return the mark of one world's goal in pictures.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Checks of the class of a task: attributes that would be ignored, or that would hide the task's own."""
+"""Check the class of a task for attributes that would be ignored, or would hide the task's own."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OF_INFO = ("is_success", "physics_status", "reset_mask", "elapsed_steps")
 
 
 def check_class(task: type, base: type, declaration: type) -> None:
-    """Look at what the body of a subclass of `Task` defines.
+    """Check the attributes that a subclass of `Task` defines.
 
     Parameters
     ----------

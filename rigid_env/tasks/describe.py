@@ -1,4 +1,4 @@
-"""Documentation of any task as Markdown: the tables of an environment's docstring, from what the task declares.
+"""Documentation of any task as Markdown: the tables of an environment's docstring, from the task's declaration.
 
 `rigid_env.envs.block_reach` is the form: Gymnasium's sections in Gymnasium's order.
 """
@@ -84,7 +84,7 @@ class Section:
 
     @property
     def markdown(self) -> str:
-        """Heading, text and table."""
+        """The section in Markdown: heading, text and table."""
         parts = [f"## {self.title}", *map(_wrapped, self.before)]
         if self.rows:
             lines = (self.columns, ("---",) * len(self.columns), *self.rows)
@@ -94,7 +94,7 @@ class Section:
         return "\n\n".join([*parts, *map(_wrapped, self.after)])
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """Section ready for JSON."""
         return {"title": self.title, "text": [*self.before, *self.after], "columns": self.columns, "rows": self.rows}
 
 

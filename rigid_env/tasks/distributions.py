@@ -1,4 +1,4 @@
-"""Distributions that the start of an episode draws from: each turns uniform numbers into values.
+"""Distributions for the start of an episode; each turns uniform numbers into values.
 
 A distribution takes a fixed number of uniform numbers, whatever the values are. An episode draws them all at once from
 the generator of its world, so that fixing one value, or replacing one distribution, leaves the others of a seed alone.
@@ -20,11 +20,11 @@ DEVIATIONS = 5.0
 """Standard deviations from the mean at which a normal distribution is cut off."""
 
 Drawn = Mapping[str, np.ndarray]
-"""Values drawn before, by name: (n,) or (n, k) float64."""
+"""Type of values drawn before, by name: (n,) or (n, k) float64."""
 
 
 class Distribution(ABC):
-    """Values of one name in every new episode.
+    """Distribution of one named value over new episodes.
 
     Attributes
     ----------
@@ -59,15 +59,15 @@ class Distribution(ABC):
 
     @property
     def is_fixed(self) -> bool:
-        """True if there is nothing to draw."""
+        """True if the value is fixed."""
         return False
 
     def ends(self) -> np.ndarray:
-        """(2,) or (2, length) values of the least and the largest uniform numbers."""
+        """Values (2,) or (2, length) at the least and the largest uniform numbers."""
         return np.stack([self.at(np.full((1, self.uniforms), share), {})[0] for share in (0.0, LAST)])
 
     def read(self, field: str, value, worlds: int) -> np.ndarray:
-        """Check what a user gives in place of a draw.
+        """Check a user's value that takes the place of a draw.
 
         Parameters
         ----------
@@ -90,7 +90,7 @@ class Distribution(ABC):
 
 
 def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
-    """(worlds,) for a length of 1, else (worlds, length): finite numbers, from one for all worlds or one for each."""
+    """Finite numbers (worlds,) or (worlds, length), from one value for all worlds or one for each."""
     shape = (worlds,) if length == 1 else (worlds, length)
     try:
         array = np.asarray(value)
@@ -133,7 +133,7 @@ class _Elementwise(Distribution):
 
     @property
     def is_scalar(self) -> bool:
-        """True if a value is a number, not a row of one."""
+        """True if a value is a single number, not a row."""
         return self._first.ndim == 0
 
     @property
@@ -312,18 +312,18 @@ class Choice(Distribution):
 
 
 def is_of_user(distribution: Distribution) -> bool:
-    """True if code of a user draws, in it or in a distribution that it holds."""
+    """True if a user's code draws, in the distribution or in one that it holds."""
     parts = (distribution, *(part for part in vars(distribution).values() if isinstance(part, Distribution)))
     return any(not str(type(part).__module__).startswith("rigid_env.") for part in parts)
 
 
 def is_elementwise(distribution: Distribution) -> bool:
-    """True if numbers of one value are drawn, each from a range of its own: several of them are hardly ever equal."""
+    """True if a value's numbers are drawn independently, so that two of them are hardly ever equal."""
     return isinstance(distribution, _Elementwise) and not distribution.is_fixed
 
 
 def as_distribution(field: str, value, length: int | None = None) -> Distribution:
-    """Turn what a user gives for a name into a distribution.
+    """Make a distribution from a user's value.
 
     Parameters
     ----------

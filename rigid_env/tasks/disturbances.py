@@ -91,7 +91,7 @@ class Gust:
 
 
 def _take_size(kind: Push | Gust, field: str) -> None:
-    """Make a field a distribution of numbers that are not negative."""
+    """Replace a field by a distribution of non-negative numbers."""
     value = getattr(kind, field)
     sizes = as_distribution(field, value, 1)
     if (sizes.ends() < 0.0).any():
@@ -100,7 +100,7 @@ def _take_size(kind: Push | Gust, field: str) -> None:
 
 
 def direction(shares: np.ndarray, axes: str) -> np.ndarray:
-    """(3,) unit vector from two uniform numbers, each direction along the `axes` as likely as the other."""
+    """Random unit vector (3,) from two uniform numbers, uniform over directions along the `axes`."""
     vector = np.zeros(3)
     places = ["xyz".index(axis) for axis in axes]
     if len(places) == 1:
@@ -116,7 +116,7 @@ def direction(shares: np.ndarray, axes: str) -> np.ndarray:
 
 
 def quiet_steps(mean: float, share: float) -> int:
-    """Number of control steps before a disturbance that starts in each with the same probability, 1 / (1 + `mean`).
+    """Number of control steps before a disturbance that starts in each step with the probability 1 / (1 + `mean`).
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def quiet_steps(mean: float, share: float) -> int:
 
 
 class Disturbances:
-    """All disturbances of a batch, and when the next ones come.
+    """All disturbances of a batch, and the times of the next ones.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ class Disturbances:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """All that decides what comes, the generators apart: views with the worlds first."""
+        """Arrays that decide the coming disturbances, without the random generators: views with the worlds first."""
         return {
             "disturbance start": self.next.swapaxes(0, 1), "disturbance end": self.end.swapaxes(0, 1),
             "disturbance force": self.force.swapaxes(0, 1), "disturbance load": self.load,
@@ -182,7 +182,7 @@ class Disturbances:
             self.next[k, rows] = [quiet_steps(quiet, self._task.generators[world].random()) for world in rows]
 
     def wait_anew(self) -> None:
-        """Draw anew when the next disturbances start: for a model that must not know.
+        """Draw the starts of the next disturbances anew, for a model that must not know them.
 
         A disturbance starts in each quiet step with the same probability, so waits that go on from now have the same
         distribution.
@@ -197,11 +197,11 @@ class Disturbances:
         return kind.every / self._task.control_dt - (1.0 if isinstance(kind, Push) else 0.0)
 
     def due(self) -> np.ndarray:
-        """(n,) int64. Worlds in which a disturbance starts in the coming control step."""
+        """Worlds (n,) int64 in which a disturbance starts in the coming control step."""
         return np.flatnonzero((self.next <= self._task.steps).any(axis=0))
 
     def act(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Load (worlds, bodies, 6) of the coming control step, and that of its first physics step besides, if any."""
+        """Load (worlds, bodies, 6) of the coming control step, and the extra load of its first physics step, if any."""
         steps, push = self._task.steps, self._push
         self.load.fill(0.0)
         if push is not None:
@@ -218,7 +218,7 @@ class Disturbances:
         return self.load, push
 
     def _draw(self, k: int, kind: Any, world: int, step: int) -> None:
-        """Draw the disturbance that starts in a control step, and when the next one does."""
+        """Draw a disturbance that starts in a control step, and the start of the next one."""
         task = self._task
         shares = task.generators[world].random(UNIFORMS)
         along = direction(shares[:2], kind.axes)

@@ -1,4 +1,4 @@
-"""Values of the episodes: drawn at their start, fixed by an option, or held at a value from outside."""
+"""Values of episodes: drawn at their start, fixed by an option, or held at a given value."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from rigid_env.tasks.distributions import Distribution, is_elementwise, is_of_us
 from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
 
 SEED = 0
-"""Of values before the first episode: any, so long as it stays the same."""
+"""Seed of values before the first episode; any fixed number serves."""
 
 NEAR = 0.8
-"""Likeness from which on a name is taken for a misspelt one."""
+"""Least likeness at which a name counts as a misspelling of another."""
 
 DOWN = (0.0, -1.0, 0.0)
-"""Direction of gravity in a world that has had none."""
+"""Direction of gravity in a world that has never had any."""
 
 _PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[(\d+)\])?$")
 
 
 def parameter_of(name: str) -> tuple[str, int | None] | None:
-    """Physical parameter that a name means, and its body (None: all); None if it is a name of the task's own."""
+    """Physical parameter of a name, and its body (None: all); None for a name of the task's own."""
     found = _PARAMETER.match(name)
     return None if found is None else (found[1], None if found[2] is None else int(found[2]))
 
 
 class Draws:
-    """Values in every world of a batch, by name.
+    """Values by name, in every world of a batch.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Draws:
         self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
 
     def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Values of new episodes; nothing is changed.
+        """Draw values of new episodes, without changing the present ones.
 
         Parameters
         ----------
@@ -105,11 +105,11 @@ class Draws:
         return values
 
     def rehearsal(self) -> np.ndarray:
-        """(1, uniforms) uniform numbers of an episode, always the same: for values before the first one."""
+        """Fixed uniform numbers (1, uniforms) of an episode, for values before the first one."""
         return np.random.default_rng(SEED).random((1, self.uniforms))
 
     def _check(self, name: str, values, count: int) -> None:
-        """Refuse what a distribution of a user gives, if it is no finite numbers of the right shape."""
+        """Refuse values of a user's distribution that are not finite numbers of the right shape."""
         length = self.distributions[name].length
         shape = (count,) if length == 1 else (count, length)
         what = f"at of {type(self.distributions[name]).__name__}, draws {name},"
@@ -120,7 +120,7 @@ class Draws:
             raise ValueError(f"{what} gave {values[~np.isfinite(values)][0]}; allowed are finite numbers")
 
     def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
-        """Note the values of new episodes."""
+        """Store the values of new episodes."""
         for name, value in values.items():
             self.now[name][rows] = value
         self.varying.update(name for name in self.parameters if name in options)
@@ -174,7 +174,7 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
 
 
 def check_draws(task: str, distributions: Mapping[str, Distribution], world: World) -> None:
-    """Refuse physical parameters that the scene has no use for, or that are out of range.
+    """Refuse physical parameters that the scene cannot use, or that are out of range.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
 
 
 def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: World, name: str) -> None:
-    """Refuse a radius of other bodies than spheres, one beside a size, and a size of three numbers of a sphere."""
+    """Refuse a radius of bodies other than spheres, one beside a size, and a size of three numbers of a sphere."""
     kind, body = parameter_of(name) or ("", None)
     bodies = world.scene.bodies
     meant = range(len(bodies)) if body is None else (body,)

@@ -21,7 +21,7 @@ class Entry:
     unit : str
         In which it is told, such as ``m/s``.
     low, high : float
-        Bounds, in this unit; what is read is clipped to them.
+        Bounds, in this unit; the numbers read are clipped to them.
     read : callable, optional
         From `Worlds` to the numbers, (n,) or (n, numbers). None where a compiled function writes the observation.
     scale : float
@@ -79,7 +79,7 @@ def refuse_twice(names: Sequence[str]) -> None:
 
 
 class Observation:
-    """All entries of a task, and how they are read.
+    """All entries of a task, and the order of their numbers.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class Observation:
         return [name for entry in self.entries for name in entry.names]
 
     def _make_targets(self, count: int) -> tuple[np.ndarray, list]:
-        """Table (count, size) for what entries give, and the part of it that each one writes."""
+        """Table (count, size) for the numbers of entries, and the part of it that each entry writes."""
         table = np.empty((count, self.size))
         return table, [
             (entry, table[:, place], table[:, place.start] if len(entry.names) == 1 else table[:, place])

@@ -1,4 +1,4 @@
-"""NumPy functions of a task: called once in a control step, looked at, and written into the batch."""
+"""Call a task's NumPy functions once in a control step, check their results, and write them into the batch."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from rigid_env.tasks.worlds import Worlds
 
 
 class Functions:
-    """Calls of the functions of a task that has no compiled one.
+    """Calls of the functions of a task without compiled ones.
 
-    Each function is called once when this is made, in a world at its start, so that a mistake shows at once: a
-    rehearsal, with values that are drawn for it.
+    Each function is called once when the object is made, in a world at its start, with drawn values. This rehearsal
+    shows a mistake at once.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Functions:
         self.before = Before(task)
 
     def _rehearse(self) -> None:
-        """Call each function once in world 0, with values drawn for it; an error says that it is a rehearsal."""
+        """Call each function once in world 0, with values drawn for it; errors say that this is a rehearsal."""
         task = self.task
         world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
         values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
@@ -72,7 +72,7 @@ class Functions:
                 task.drawn[name][0] = array
 
     def _call_each(self, values: Mapping[str, np.ndarray]) -> None:
-        """Call each function for two rows of world 0, so that no shape fits by chance."""
+        """Call each function for two rows of world 0, so that no wrong shape fits by chance."""
         task = self.task
         task.move(np.zeros(1, dtype=np.int64), values, {})
         worlds = Worlds(task, np.zeros(2, dtype=np.int64))
@@ -106,7 +106,7 @@ class Functions:
         task.outcome[rows], task.obs[rows] = outcome, obs
 
     def step(self, actions: np.ndarray) -> None:
-        """Move all worlds and look at them; after an error nothing has changed."""
+        """Move and observe all worlds; after an error nothing has changed."""
         task = self.task
         task.given[...] = actions
         if not np.isfinite(task.given).all():
@@ -135,7 +135,7 @@ class Functions:
         task.outcome[...], task.obs[...] = outcome, self._obs
 
     def _look(self, worlds: Worlds) -> Mapping:
-        """Call the functions that look at a state, in their order; gives the terms of the reward."""
+        """Call the functions that read a state, in their order; return the terms of the reward."""
         task = self.task
         self._measure(worlds)
         task.update(worlds)
@@ -147,7 +147,7 @@ class Functions:
         worlds.measured = Named(self._numbers("measure", self.task.measure(worlds), len(worlds)), "measured")
 
     def _numbers(self, function: str, values, count: int) -> dict:
-        """Check what a function gives before others read it: a dict of numbers, one for each world or one for all."""
+        """Check a function's result before others read it: a dict of numbers, one for each world or one for all."""
         if type(values) is not dict:
             raise ValueError(f"{function} of {self._name} gave {values!r}; allowed is a dict of arrays by name")
         shape = (count,)
@@ -169,7 +169,7 @@ class Functions:
         return values
 
     def _fill(self, function: str, values: Mapping, names: tuple[str, ...], out: np.ndarray, first: int) -> None:
-        """Write numbers by name into columns of `out` from `first` on."""
+        """Write numbers by name into the columns of `out` from `first` on."""
         if tuple(values) != names:
             raise ValueError(
                 f"{function} of {self._name} gave the names {', '.join(map(repr, values))}; allowed are those of its "
@@ -179,7 +179,7 @@ class Functions:
             out[:, k] = value
 
     def _check_finite(self, outcome: np.ndarray, seen: np.ndarray, obs: np.ndarray, indices: np.ndarray) -> None:
-        """Refuse numbers that are not finite: outcomes, what the entries gave (`seen`), observations of it."""
+        """Refuse numbers that are not finite, in outcomes, entries (`seen`) and observations."""
         with np.errstate(invalid="ignore", over="ignore"):
             total = outcome.sum() + seen.sum() + obs.sum()  # not finite if one of the numbers is not
         if math.isfinite(total):

@@ -1,4 +1,4 @@
-"""Tasks with goals: observations that tell the goal that is wanted and the one that is achieved."""
+"""Tasks with goals: observations that contain the desired and the achieved goal."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ REWARDS = ("sparse", "dense")
 
 
 class GoalTask(Task):
-    """A task whose reward and success follow from two rows of numbers: the goal that is wanted, and the one achieved.
+    """Task whose reward and success follow from two rows of numbers, the desired and the achieved goal.
 
-    An algorithm may then ask for the reward of another goal than the one that was wanted, as hindsight experience
-    replay does. Success does not end an episode: a goal is to be kept.
+    An algorithm may compute the reward of another goal than the desired one, as hindsight experience replay does.
+    Success does not end an episode, since a goal is to be kept.
 
     A subclass declares `goal_entries`, and defines `desired` and `shortfall`.
 
@@ -62,14 +62,14 @@ class GoalTask(Task):
 
     @abstractmethod
     def desired(self, worlds) -> np.ndarray:
-        """(n, numbers) goals that are wanted, before scaling, as `read` of `goal_entries` gives them.
+        """Desired goals (n, numbers) before scaling, as `read` of `goal_entries` gives them.
 
-        They are told as those achieved are: over the scales, and clipped to the bounds.
+        Observations contain them like the achieved goals: divided by the scales, and clipped to the bounds.
         """
 
     @abstractmethod
     def shortfall(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Say how far an achieved goal is from a wanted one.
+        """Return the distance of an achieved goal from a desired one.
 
         Parameters
         ----------
@@ -109,14 +109,14 @@ class GoalTask(Task):
         return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
 
     def is_reached(self, achieved_goal, desired_goal) -> np.ndarray:
-        """(...,) bool: a goal counts as reached."""
+        """Goals (...,) bool that count as reached."""
         achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
         return self.shortfall(achieved, desired) <= 1.0
 
     # --- functions of the task ----------------------------------------------------------------------------
 
     def measure(self, worlds):
-        """Note both goals, and tell the shortfall."""
+        """Store both goals, and return the shortfall."""
         rows, goals = worlds.indices, self._goals
         achieved = np.empty((len(worlds), goals.size), dtype=np.float32)
         self._check_goals("achieved", goals.read(worlds, achieved), rows)
@@ -127,7 +127,7 @@ class GoalTask(Task):
         return {"shortfall": self.shortfall(*self._both(rows))}
 
     def _check_goals(self, which: str, values: Any, rows: np.ndarray) -> None:
-        """Refuse goals that are no finite numbers of the right shape."""
+        """Refuse goals that are not finite numbers of the right shape."""
         name, shape = type(self).__name__, (len(rows), self._goals.size)
         if not isinstance(values, np.ndarray) or values.shape != shape or values.dtype.kind not in "fiub":
             given = f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else shown(values)
@@ -145,7 +145,7 @@ class GoalTask(Task):
         return worlds.measured["shortfall"] <= 1.0
 
     def rewards(self, worlds):
-        """`compute_reward` of what is observed."""
+        """Reward by `compute_reward` of the observed goals."""
         rows = worlds.indices
         return {"goal": self.compute_reward(self.achieved_goal[rows], self.desired_goal[rows])}
 
@@ -157,7 +157,7 @@ class GoalTask(Task):
         return {"reward": self.reward}
 
     def own_arrays(self):
-        """Both goals."""
+        """Arrays of both goals."""
         return {"achieved goal": self.achieved_goal, "desired goal": self.desired_goal}
 
     def __getstate__(self):

@@ -105,7 +105,7 @@ def start_poses(place, yaw, faces, half, pos, quat):
 
 @inlined
 def observe_motion(world, first, state, obs):
-    """Height and velocities into obs[world, first : first + 7]; returns speed [m/s] and spin [rad/s]."""
+    """Write height and velocities into obs[world, first : first + 7]; return speed [m/s] and spin [rad/s]."""
     vx, vy, vz = state[world, at.LINVEL], state[world, at.LINVEL + 1], state[world, at.LINVEL + 2]
     wx, wy, wz = state[world, at.ANGVEL], state[world, at.ANGVEL + 1], state[world, at.ANGVEL + 2]
     obs[world, first] = clip(state[world, at.POS + 1] / HEIGHT_SCALE, 0.0, LENGTH_BOUND)
@@ -120,7 +120,7 @@ def observe_motion(world, first, state, obs):
 
 @inlined
 def observe_gaps(world, first, state, R, record, walls, obs):
-    """Smallest distances of the block's corners from the three walls into obs[world, first : first + 3]."""
+    """Write smallest distances of the block's corners from the three walls into obs[world, first : first + 3]."""
     for k in range(3):
         nx, ny, nz = walls[k, at.WALL_NORMAL], walls[k, at.WALL_NORMAL + 1], walls[k, at.WALL_NORMAL + 2]
         gap = nx * state[world, at.POS] + ny * state[world, at.POS + 1] + nz * state[world, at.POS + 2]
@@ -145,7 +145,7 @@ def attitude(world, state):
 
 @inlined
 def conclude(world, is_met, potential, error, speed, spin, actions, record, outcome):
-    """Count the hold, then reward and success of one world; `actions` is None at the start of an episode."""
+    """Count the hold, then write reward and success of one world; `actions` is None at the start of an episode."""
     hold = effort = 0.0
     if actions is not None and is_met and speed <= REST_SPEED and spin <= REST_SPIN:
         hold = record[world, col.HOLD] + 1.0
@@ -212,9 +212,9 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
 def observe_reorient(taken, state, record, walls, actions, obs, outcome):
     """BlockReorient: observation, reward and success of some worlds; arguments as `observe_reach`.
 
-    The body axes are told as seen from the goal: first the outward normal of the target face, then the next
-    two body axes in cyclic order, with the half edges in the same order; the policy need not know which face
-    it is. obs is (worlds, 23) float32.
+    The body axes are given in the order of the goal: first the outward normal of the target face, then the next two
+    body axes in cyclic order, with the half edges in the same order. So the policy need not know which face it is. obs
+    is (worlds, 23) float32.
     """
     for i in range(taken[TAKEN_COUNT]):
         world = taken[TAKEN_FIRST_WORLD + i]

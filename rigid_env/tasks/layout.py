@@ -1,4 +1,4 @@
-"""Columns of the arrays that the block's kernels share: the place of each number of a task.
+"""Columns of the arrays that the block's kernels share: one for each number of a task.
 
 Row `world` of each array belongs to one world; the block is the only body, so that row `world` of
 `physics.World.state` is its state.

@@ -1,4 +1,4 @@
-"""Numbers by name, as a task's functions read and write them."""
+"""Numbers by name, for a task's functions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from physics.keywords import nearest_first
 
 
 class Named(dict):
-    """Arrays by name. A name that is not there is told with those that are.
+    """Arrays by name. The error for an unknown name lists the known ones.
 
     Parameters
     ----------

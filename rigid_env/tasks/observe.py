@@ -51,7 +51,7 @@ def quat(body: int = 0) -> Entry:
 
 
 def rotation(body: int = 0) -> Entry:
-    """Rotation matrix, body to world, row by row: without the two signs of a quaternion."""
+    """Rotation matrix, body to world, row by row; unlike a quaternion it has no two signs."""
     check_body(body)
     head = "R" if body == 0 else f"R of body {body}"
     names = tuple(f"{head}[{i}, {j}]" for i in range(3) for j in range(3))
@@ -80,7 +80,7 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
 
 
 def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
-    """Sum of the contact impulses on a body over its weight, of the last resting stage; collisions have no part in it.
+    """Sum of the contact impulses on a body over its weight, in the last resting stage; collisions are left out.
 
     A stage is what the last physics step ends with: see `physics.schemes.contacts.Contacts`.
     """
@@ -90,7 +90,7 @@ def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH)
 
 
 def contact_points(body: int = 0, count: int = 4, scale: float = LENGTH, bound: float = REACH) -> Entry:
-    """Points of the `count` strongest contacts of a body, from its centre of mass [m]; zeros where there are fewer."""
+    """Points of the `count` strongest contacts of a body, from its centre of mass [m]; zeros if there are fewer."""
     names = _contact_names("point", body, count)
     return Entry(names, "m", -bound, bound, lambda worlds: _arms(worlds, body, count), scale)
 
@@ -122,7 +122,7 @@ def _arms(worlds, body: int, count: int) -> np.ndarray:
 
 
 def drawn(name: str, length: int = 1, unit: str = "1", scale: float = 1.0, bound: float = REACH) -> Entry:
-    """A value of the episode, such as the goal, by its name in the task's `draws`."""
+    """Value of the episode, such as the goal, by its name in the task's `draws`."""
     names = name if length == 1 else tuple(f"{name} {k}" for k in range(length))
     return Entry(names, unit, -bound, bound, lambda worlds: worlds.drawn[name], scale)
 

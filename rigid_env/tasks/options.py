@@ -1,4 +1,4 @@
-"""Options of `reset`: every one is looked at before anything changes."""
+"""Options of `reset`, all checked before anything changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.keywords import nearest_first
 def require_known(
     options: Mapping[str, Any] | None, allowed: Iterable[str], field: str = "options"
 ) -> Mapping[str, Any]:
-    """Check the keys of options, or of a mapping of another name: gives the mapping, an empty one for None.
+    """Check the keys of options, or of another named mapping; return the mapping, an empty one for None.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Physical parameters that episodes may differ in, and how the block's tasks take them as arguments."""
+"""Physical parameters that may differ between episodes, and their form as arguments of the block's tasks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from physics import validation
 from rigid_env.tasks.distributions import Distribution, Uniform
 
 Number = float | Sequence[float] | NDArray[Any] | Distribution
-"""A value, a range (low, high) to draw from, or a distribution."""
+"""Type of an argument: a value, a range (low, high) to draw from, or a distribution."""
 
 Edges = Sequence[float] | Sequence[Sequence[float]] | NDArray[Any] | Distribution
-"""Edges of the block [m], a range of them, or a distribution."""
+"""Type of an argument: edges of the block [m], a range of them, or a distribution."""
 
 CHECKS = {
     "mass": validation.positive,
@@ -25,20 +25,20 @@ CHECKS = {
     "gravity": validation.positive,
     "radius": validation.positive,
 }
-"""Values that each parameter may have."""
+"""Check of each parameter's values."""
 
 LENGTHS = {"mass": 1, "size": 3, "friction": 1, "restitution": 1, "gravity": 1}
-"""Numbers in each parameter, in the order in which the block's tasks draw them."""
+"""Number of numbers in each parameter, in the order in which the block's tasks draw them."""
 
 DRAWN_LENGTHS = {**LENGTHS, "radius": 1}
-"""Numbers in each parameter that a task may draw: the radius of spheres has one, where their size has three."""
+"""Number of numbers in each parameter that a task may draw; the radius of spheres has one, their size three."""
 
 OFF_MIDDLE = (0.25, 0.4, 0.75)
-"""Shares of a range of sizes at which the block of a scene is no cube, where the middle is one."""
+"""Shares of a range of sizes at which a scene's block is no cube, if the middle is one."""
 
 
 def parse_range(field: str, value: Any) -> Distribution:
-    """Distribution of a parameter from what a user gives.
+    """Distribution of a parameter from a user's value.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def middle(distribution: Distribution) -> np.ndarray:
 
 
 def scene_size(distribution: Distribution) -> np.ndarray:
-    """Edges (3,) of the block that kernels are compiled for: the middle, of a range no cube [m].
+    """Edges (3,) of the block that kernels are compiled for [m]: the middle of a range, but no cube.
 
     The kernel of a cube has no gyroscopic torque, which all other blocks of the range need.
     """

@@ -1,4 +1,4 @@
-"""Effects that a user gives in place of a task's own."""
+"""Effects that a user gives instead of a task's own."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import physics
 
 REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
-"""The parameter of a task that an effect takes the place of."""
+"""Parameter of a task that each effect replaces."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:
@@ -29,12 +29,12 @@ def checked_effects(effects, randomised: Collection[str]) -> tuple:
 
 
 def replaced(effects: Sequence) -> dict[str, object]:
-    """Parameters that `effects` take the place of, each with its effect."""
+    """Replaced parameters, each with the effect that replaces it."""
     return {REPLACES[type(effect)]: effect for effect in effects if type(effect) in REPLACES}
 
 
 def refuse_replaced(effects: Sequence, fields: Collection[str], kind: str = "") -> None:
-    """Raise a ValueError if one of `fields`, of a `kind` that the message begins with, is taken by an effect."""
+    """Raise a ValueError if an effect replaces one of `fields`; the message begins with `kind`."""
     for field, effect in replaced(effects).items():
         if field in fields:
             raise ValueError(f"{kind}{field} was given, but effects holds {effect!r}; allowed is one of the two")

@@ -49,13 +49,13 @@ class TaskRollout:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """(worlds,) int64. Control steps up to the first that ends an episode, itself included; else all."""
+        """Number of control steps (worlds,) int64 up to the first that ends an episode, itself included; else all."""
         ends = self.failure | self.success if self.ends_on_success else self.failure
         return np.where(ends.any(axis=1), ends.argmax(axis=1) + 1, ends.shape[1])
 
     @property
     def returns(self) -> NDArray[np.float64]:
-        """(worlds,) float64. Sums of the rewards up to the end of each episode."""
+        """Sums (worlds,) float64 of the rewards up to the end of each episode."""
         counts = np.arange(self.rewards.shape[1]) < self.lengths[:, None]
         return np.where(counts, self.rewards, 0.0).sum(axis=1)
 
@@ -65,7 +65,7 @@ class TaskRollout:
 
     @property
     def nbytes(self) -> int:
-        """Memory of its arrays [bytes]."""
+        """Memory of the arrays [bytes]."""
         arrays = (self.rewards, self.success, self.failure, self.observations, self.status)
         return sum(array.nbytes for array in arrays if array is not None)
 
@@ -91,11 +91,11 @@ def rollout(
     every: int = 1,
     out: TaskRollout | None = None,
 ) -> TaskRollout:
-    """Step every world of a task with its own sequence of actions, and keep what they earn.
+    """Step every world of a task with its own sequence of actions, and keep the rewards.
 
-    The same bits as `Task.step` with one action after another. No episode starts anew: what a world does after the
-    end of its own is in the arrays too, and is left out of `TaskRollout.returns`. Afterwards the task is where the last
-    step left it.
+    A rollout has the same bits as `Task.step` with one action after another. No episode restarts. The arrays contain
+    the steps after the end of an episode, too, but `TaskRollout.returns` leaves them out. Afterwards the task is in the
+    state after the last step.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _actions(task: Task, actions: ArrayLike) -> np.ndarray:
 
 
 def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kept:
-    """Arrays to keep things in: those of `out`, or new ones; refused where this machine's memory does not hold them."""
+    """Arrays for results: those of `out`, or new ones; refused where this machine's memory is too small."""
     worlds, entries = task.obs.shape
     if out is not None:
         return _checked(out, worlds, length, (worlds, samples, entries))
@@ -191,7 +191,7 @@ def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, 
 
 
 def _needs_python(task: Task) -> bool:
-    """True if something is to be done in Python between two control steps."""
+    """True if Python has work to do between two control steps."""
     world = task.world
     if task.compiled is None or task.disturbed is not None or task.has_impulses:
         return True
@@ -199,7 +199,7 @@ def _needs_python(task: Task) -> bool:
 
 
 def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
-    """Take control steps from Python; the gravest `status` of each world."""
+    """Take control steps from Python; return the gravest `status` of each world."""
     gravity = np.array([Status.severity(status) for status in Status])
     status = np.full(task.worlds, Status.OK, dtype=np.int64)
     for k in range(actions.shape[1]):
@@ -215,7 +215,7 @@ def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.n
 
 @exclusive
 def _all_at_once(world, task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
-    """Take control steps in machine code; the gravest `status` of each world."""
+    """Take control steps in machine code; return the gravest `status` of each world."""
     total, length, loop = np.zeros_like(world.report_table), actions.shape[1], task.rollout_loop
     arrays = (task.outcome, task.obs, world.report_table, total, kept)
     before = [bound_alike(None, begin_control, moment, actions, *task.wrench_arguments) for moment in loop.moments]

@@ -1,4 +1,4 @@
-"""Part of a task's rollout after each control step of a block of worlds: what it keeps."""
+"""Parts of a task's rollout after each control step of a block of worlds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigid_env.tasks import layout as col
 
 
 class Kept(NamedTuple):
-    """Arrays of a rollout, with the worlds first."""
+    """Arrays that a rollout keeps, with the worlds first."""
 
     rewards: np.ndarray  # (worlds, length) float64
     success: np.ndarray  # (worlds, length) bool

@@ -1,4 +1,4 @@
-"""Keys of a table [environment] of a scene file, or arguments of the same names, and errors that tell their place."""
+"""Keys of a table [environment] of a scene file, or equal arguments, and errors that name their place."""
 
 from __future__ import annotations
 
@@ -39,26 +39,26 @@ class Section:
         return ValueError(f"{self.name}: {message}" if self.name else message)
 
     def require_known(self, allowed: Iterable[str]) -> None:
-        """Raise an error about a key that is not `allowed`, if there is one; the nearest allowed stand first."""
+        """Raise an error about a key that is not `allowed`, if there is one; it lists the nearest names first."""
         for key in self.values:
             if key not in allowed:
                 raise self.error(key, f"{key} is not known; allowed are {', '.join(nearest_first(key, allowed))}")
 
     def read(self, key: str, check: Callable[[Any, str], T]) -> T:
-        """Value of a key that is there, after `check` (value, key), whose error gets its place."""
+        """Value of an existing key, after `check` (value, key), whose error gets the key's place."""
         try:
             return check(self.values[key], key)
         except ValueError as error:
             raise self.error(key, str(error)) from None
 
     def require(self, key: str, check: Callable[[Any, str], T], needed: str) -> T:
-        """Value of a key that must be there; `needed` says what it is in the error."""
+        """Value of a required key; `needed` describes it in the error."""
         if key not in self.values:
             raise self.error(None, f"{key} is missing; allowed is {needed}")
         return self.read(key, check)
 
     def part(self, key: str, allowed: Iterable[str]) -> Section:
-        """Table in this table; its keys are among `allowed`."""
+        """Table in this table, whose keys must be among `allowed`."""
         name = f"{self.name}.{key}" if self.name else key
         values = self.values[key]
         if not isinstance(values, Mapping):

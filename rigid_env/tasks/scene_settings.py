@@ -1,4 +1,4 @@
-"""Settings of the environment of a scene: the table [environment] of its file, or arguments in place of its keys."""
+"""Settings of a scene's environment: the table [environment] of its file, or arguments in place of its keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigid_env.tasks.observe import LENGTH, REACH
 from rigid_env.tasks.scene_section import Section, body_indices
 
 FORCE, TORQUE = 0.9, 0.5
-"""Longest force over a driven body's weight, and longest torque over weight times reach (`actions.Wrench`)."""
+"""Largest force over a driven body's weight, and largest torque over weight times reach (`actions.Wrench`)."""
 
 LIMITS = {"force": FORCE, "torque": TORQUE}
 """Keys of the limits, with their defaults."""
@@ -28,7 +28,7 @@ FRAME_SKIP, DT = 5, 0.005
 """Physics steps per control step, and their length [s]."""
 
 GOAL_SPEED = 0.1
-"""[m/s] At most, where a goal counts as reached."""
+"""[m/s] Largest speed at which a goal counts as reached."""
 
 KEYS = ("driven", "force", "torque", "frame", "length", "goal", "start", "frame_skip", "dt", "max_episode_steps")
 GOAL_KEYS = ("body", "pos", "low", "high", "tolerance", "speed")
@@ -36,7 +36,7 @@ START_KEYS = ("pos", "linvel", "angvel")
 
 
 class Place(Uniform):
-    """Places that an observation in units of `length` can tell.
+    """Places that an observation in units of `length` covers.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that `SceneTask` documents; `start` has half widths (3,) of what each body's start may differ by."""
+    """Settings that `SceneTask` documents; `start` has half widths (3,) of the variation of each body's start."""
 
     driven: tuple[int, ...]
     force: float
@@ -94,7 +94,7 @@ class Settings:
 
 
 class SettingsReader:
-    """Reader of the settings of one scene: each from the arguments where it is given there, else from the file.
+    """Reader of a scene's settings: arguments first, then the file.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ class SettingsReader:
         self._given = Section({key: value for key, value in given.items() if value is not None})
 
     def section(self, key: str) -> Section:
-        """Section that a key is taken from."""
+        """Section that contains a key."""
         return self._given if key in self._given else self._file
 
     def start_error(self, key: str, message: str) -> ValueError:

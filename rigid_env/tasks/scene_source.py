@@ -1,4 +1,4 @@
-"""From the name of a canonical scene, or a scene file, to the scene and what stands beside it."""
+"""Find a scene, and further contents of its file, by the name of a canonical scene or by a file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ENDINGS = f"{', '.join(SCENE_FILES[:-1])} or {SCENE_FILES[-1]}"
 
 
 class Found(NamedTuple):
-    """A scene that a user names.
+    """Scene of a user, and further contents of its file.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Found(NamedTuple):
 
 
 def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
-    """Scene that is given as an object, by the name of a canonical scene, or as a file.
+    """Scene given as an object, by the name of a canonical scene, or as a file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""SceneTask: the bodies of any scene, some of them driven, and a place to bring one of them to."""
+"""SceneTask: the bodies of any scene, some of them driven, and a goal for one of them."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class SceneTask(Task):
         return draws if goal is None else {**draws, "goal": goal.place}
 
     def _check_starts(self) -> None:
-        """Refuse starts that may lie deep inside a wall: those nearest to each wall are looked at."""
+        """Refuse starts that may lie deep inside a wall, by those nearest to each wall."""
         if "pos" not in self.settings.start:
             return
         bodies, chosen = self.world.body_count, np.zeros(1, dtype=np.int64)
@@ -120,12 +120,12 @@ class SceneTask(Task):
         return entries if self.settings.goal is None else [*entries, observe.drawn("goal", 3, "m", length)]
 
     def place(self, drawn):
-        """Poses and velocities of the scene, with what the episode adds."""
+        """Poses and velocities of the scene, plus the variation of the episode."""
         shape = (-1, self.world.body_count, 3)
         return {key: self._own_starts[key] + drawn[f"start_{key}"].reshape(shape) for key in self.settings.start}
 
     def measure(self, worlds):
-        """Distance from the goal [m] and speed [m/s] of the body that is to be there."""
+        """Distance from the goal [m], and speed [m/s], of the body that has the goal."""
         goal = self.settings.goal
         if goal is None:
             return {}
@@ -133,12 +133,12 @@ class SceneTask(Task):
         return {"distance": np.linalg.norm(apart, axis=1), "speed": np.linalg.norm(velocity, axis=1)}
 
     def begin(self, worlds):
-        """Note how close the body starts."""
+        """Store the initial closeness of the body."""
         if self.settings.goal is not None:
             worlds.memory["closeness"][...] = self._closeness(worlds)
 
     def update(self, worlds):
-        """Note how much closer the body has come."""
+        """Store the gain of closeness of the body."""
         if self.settings.goal is not None:
             closeness = self._closeness(worlds)
             worlds.memory["gain"][...] = closeness - worlds.memory["closeness"]
@@ -158,7 +158,7 @@ class SceneTask(Task):
         return {"progress": worlds.memory["gain"], "success": BONUS * worlds.success}
 
     def own_settings(self):
-        """Unit of lengths, and what counts as reaching the goal."""
+        """Unit of lengths, and tolerances of the goal."""
         goal, length = self.settings.goal, {"length": self.settings.length}
         if goal is None:
             return length
@@ -175,5 +175,5 @@ class SceneTask(Task):
         return {"pos": self.drawn["goal"][world], "radius": radius, "reached": reached}
 
     def _closeness(self, worlds) -> np.ndarray:
-        """(n,) 0 at the goal, and -log(1 + distance / tolerance) elsewhere: the same at every scale."""
+        """Closeness (n,): 0 at the goal, else -log(1 + distance / tolerance), the same at every scale."""
         return -np.log1p(worlds.measured["distance"] / self.settings.goal.tolerance)

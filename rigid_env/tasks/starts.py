@@ -1,4 +1,4 @@
-"""Starts of a task's episodes: what is drawn, where bodies are placed, and what follows from their parameters."""
+"""Starts of a task's episodes: draws, placement of bodies, and numbers that follow from their parameters."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
     from rigid_env.tasks.draws import Draws
 
 PARAMETER_ROUNDING = 1e-12
-"""Share by which a parameter differs from itself after it was stored: an inverse, twice a half."""
+"""Relative error of a parameter after it was stored: an inverse, twice a half."""
 
 AT_STARTS = ("declared_draws", "place", "note_episodes")
 """Functions of a compiled task that a start calls."""
 
 UNIT_GRAVITY = 9.81
-"""[m/s²] In the unit of forces where a scene has no gravity."""
+"""[m/s²] Gravity in the unit of forces where a scene has none."""
 
 
 class Starts(Declaration):
-    """The part of `Task` that begins episodes, and gives worlds the values that are drawn for them."""
+    """Part of `Task` that begins episodes, and gives the drawn values to worlds."""
 
     if TYPE_CHECKING:  # what `Task` makes and keeps
         world: physics.World
@@ -180,7 +180,7 @@ class Starts(Declaration):
         }
 
     def _unlike_scene(self) -> set[str]:
-        """Parameters that are fixed at another value than the scene's."""
+        """Parameters fixed at values other than the scene's."""
         one = np.zeros(1, dtype=np.int64)
         taken = replaced(self.effects)
         of: Any = parameter_of
@@ -194,7 +194,7 @@ class Starts(Declaration):
         return found
 
     def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Arguments of `World.set_state`: the scene's poses, with those of `place` instead."""
+        """Arguments of `World.set_state`: the scene's poses, replaced by those of `place`."""
         given = self.place(values)
         if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
             raise ValueError(
@@ -204,29 +204,29 @@ class Starts(Declaration):
         return {**self._own_starts, **given}
 
     def _check_starts(self) -> None:
-        """Refuse starts that are impossible for some draws, where a kind of tasks can tell before any is drawn."""
+        """Refuse starts that are impossible for some draws, if a kind of task can tell before the draw."""
 
     @property
     def place_options(self) -> tuple[str, ...]:
-        """Options that decide where bodies start, for errors."""
+        """Options that decide the placement of bodies, for errors."""
         return self.option_names
 
     def _note_parameters(self, rows: np.ndarray) -> None:
-        """Renew what follows from masses, sizes and gravity: weights and the limits of actions."""
+        """Update weights and the limits of actions, which follow from masses, sizes and gravity."""
         self.weights[rows] = weights = self._weights(rows)
         params = self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows]
         reach = params[..., at.DIMENSIONS : at.DIMENSIONS + 3].max(axis=2)
         self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
 
     def _weights(self, rows: np.ndarray) -> np.ndarray:
-        """(n, bodies) m g [N]."""
+        """Weights (n, bodies) m g [N]."""
         gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
         gravity[gravity == 0.0] = UNIT_GRAVITY
         masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
         return masses * gravity[:, None]
 
     def hold(self, name: str, value) -> None:
-        """Give a drawn value of every world from now on: a physical parameter at once, any other from the next start.
+        """Hold a drawn value of every world from now on: a physical parameter at once, others from the next start.
 
         Parameters
         ----------
@@ -249,7 +249,7 @@ class Starts(Declaration):
         self._note_parameters(np.arange(self.worlds))
 
     def _change(self, name: str, value: np.ndarray) -> None:
-        """Give a parameter of all worlds the values (worlds,) or (worlds, k); after an error nothing has changed."""
+        """Set a parameter of all worlds to the values (worlds,) or (worlds, k); after an error nothing has changed."""
         try:
             arguments: Any = self._arguments(np.arange(self.worlds), {name: value})
             self.world.set_parameters(**arguments)
@@ -258,14 +258,14 @@ class Starts(Declaration):
 
     @cached_property
     def may_fail(self) -> bool:
-        """True if code of a user runs at the start of an episode, which may end with an error."""
+        """True if a user's code runs at the start of an episode, which may raise an error."""
         parts = [getattr(type(self), name) for name in AT_STARTS]
         is_of_users = any(not str(part.__module__).startswith("rigid_env.") for part in parts)
         return not self.compiled or is_of_users or any(map(is_of_user, self.distributions.values()))
 
     @property
     def own_draws(self) -> tuple[str, ...]:
-        """Names that `reset` tells in its info: all that `effects` leave to the task."""
+        """Names that `reset` reports in its info: all draws that `effects` do not replace."""
         taken = replaced(self.effects)
         return tuple(name for name in self.drawn if name not in taken)
 
@@ -283,7 +283,7 @@ class Starts(Declaration):
 
 
 def distributions_of(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:
-    """Distributions of a task, with those that a user gives in place of its own, of the same lengths."""
+    """Distributions of a task, some replaced by a user's of the same lengths."""
     declared = require_known(declared, declared, "draws")
     given = require_known(given, tuple(declared), "draws")
     found = {}

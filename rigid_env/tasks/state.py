@@ -1,4 +1,4 @@
-"""State of a task: all that decides how its worlds and episodes go on, copied."""
+"""State of a task: a copy of all that decides the future of its worlds and episodes."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ FILE = FileKind(
 
 @dataclass(frozen=True)
 class TaskState:
-    """Everything that decides how the worlds of a task go on, and the settings that must be the same where they do.
+    """Copy of all that decides the future of a task's worlds, and the settings that must agree where it is restored.
 
-    Accuracy, `max_episode_steps` and distributions of draws may be others: the same worlds go on with those.
+    Accuracy, `max_episode_steps` and distributions of draws may differ: the same worlds then continue with the new
+    ones.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class TaskState:
 
     @property
     def worlds(self) -> int:
-        """Number of worlds that it is of."""
+        """Number of worlds in the state."""
         return len(self.generators)
 
     def __repr__(self) -> str:
@@ -76,7 +77,7 @@ class TaskState:
         return self.task, f"{self.worlds} worlds", f"time={self.world.time:.6g} s"
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write it as ``.npz`` (`load` reads it); returns the path.
+        """Write the state as ``.npz`` (`load` reads it); return the path.
 
         Parameters
         ----------
@@ -96,7 +97,7 @@ class TaskState:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> TaskState:
-        """Read a state that `save` has written, bit for bit; nothing in a file is run.
+        """Read a state that `save` has written, bit for bit, without running code from the file.
 
         Parameters
         ----------
@@ -113,7 +114,7 @@ class TaskState:
 
 
 def _from_parts(path: str | os.PathLike, head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> TaskState:
-    """State of the head and the arrays of a file; whether it fits a task is found out by `put`."""
+    """Make a state of the head and the arrays of a file; `put` finds out whether it fits a task."""
     world = physics.Snapshot.read(io.BytesIO(parts.pop("world").tobytes()), path)
     held = {name.removeprefix(HELD): parts.pop(name) for name in list(parts) if name.startswith(HELD)}
     count = world.worlds
@@ -135,7 +136,7 @@ def _are_names(value: Any) -> bool:
 
 
 def _are_seeds(value: Any, count: int) -> bool:
-    """Answer whether these are seeds: -1 or None before the first reset."""
+    """True if these are seeds: integers, or -1 or None before the first reset."""
     return (
         isinstance(value, list) and len(value) == count and all(each in (None, -1) or is_count(each) for each in value)
     )
@@ -209,7 +210,7 @@ def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], wo
 
 
 def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, source=None) -> tuple:
-    """Let worlds of a task go on from a state; after an error nothing has changed.
+    """Continue worlds of a task from a state; after an error nothing has changed.
 
     Parameters
     ----------
@@ -250,7 +251,7 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
 
 
 def _indices(worlds: int, held: int, places: restoring.Places) -> tuple[np.ndarray, np.ndarray]:
-    """Worlds that change, and those of the state that they go on from."""
+    """Indices of the worlds that change, and of those of the state from which they continue."""
     chosen = np.arange(worlds) if places.worlds is None else places.worlds
     if places.source is not None:
         return chosen, places.source
@@ -272,7 +273,7 @@ def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sou
 
 
 def _hold(task, state: TaskState, chosen: np.ndarray, sources: np.ndarray, is_all: bool) -> None:
-    """Hold the values that the state holds."""
+    """Give the task the held values of the state."""
     held = task.episodes.held
     for name, values in state.held.items():
         held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]
@@ -293,7 +294,7 @@ def _put_generators(generators: list, states: Sequence[dict[str, Any] | None], c
 
 
 def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
-    """Refuse a state of another task, or of the same with other settings or parts."""
+    """Refuse a state of another task, or of one with other settings or parts."""
     name = type(task).__name__
     if state.task != name:
         raise ValueError(f"state is {state!r}; allowed are states of {name}")

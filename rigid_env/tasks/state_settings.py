@@ -1,4 +1,4 @@
-"""Settings that decide how a task goes on, and that its state does not hold: they must be the same where it goes on."""
+"""Settings outside a task's state that decide its future; they must agree where a state is restored."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Setting = str | int | float
 def state_settings(task) -> dict[str, Setting]:
     """Settings of a task, by name, as values that can be compared, shown and kept in a file.
 
-    The accuracy is none of them: a state may go on with another one, by design. What is drawn is in the state.
+    The accuracy is left out on purpose: a state may continue with another one. Drawn values are in the state.
 
     Parameters
     ----------

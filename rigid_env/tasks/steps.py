@@ -50,7 +50,7 @@ class Steps:
         self.take_disturbed(None, None)
 
     def take_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
-        """Take the steps under a load besides, and in the first one under a push besides: no commands.
+        """Take the steps under an extra load, and the first one under an extra push; neither is a command.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Steps:
             self.wrench[...] = command  # which may be the array of the stepper
 
     def _run(self, stepper: physics.Stepper, command: np.ndarray, load: np.ndarray | None) -> None:
-        """Call a stepper with a command, and a load that is none."""
+        """Call a stepper with a command, and an extra load."""
         actuation = self._world.actuation
         if actuation is None:
             stepper.wrench[...] = command if load is None else command + load
@@ -82,5 +82,5 @@ class Steps:
             stepper()
 
     def note_first(self, status: np.ndarray) -> None:
-        """Write into `status` (worlds,) what the first step came to, where it is OK otherwise."""
+        """Write the status of the first step into `status` (worlds,) where that is OK."""
         np.copyto(status, self._early, where=status == physics.Status.OK)

@@ -1,4 +1,4 @@
-"""A task: what is declared of it, and the batch of worlds it runs in."""
+"""Base class of tasks: their declaration, and the batch of worlds that runs them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OF_PROCESS = (
     "_before", "_functions", "_write_arguments", "_write_wrenches", "kept_arrays", "observed", "rollout_loop",
     "rollout_observers",
 )  # fmt: skip
-"""Attributes that are left out of copies: machine code, and functions of the class."""
+"""Names of attributes left out of copies: machine code, and functions of the class."""
 
 
 class Task(Starts):
@@ -184,17 +184,17 @@ class Task(Starts):
 
     @property
     def distributions(self) -> dict[str, Distribution]:
-        """Distributions that episodes draw from, by name."""
+        """Distributions of the episodes' draws, by name."""
         return self.episodes.distributions
 
     @property
     def wrench(self) -> NDArray[np.float64]:
-        """(worlds, bodies, 6) float64, commanded by the last action: force [N], torque [N m], world frame."""
+        """Wrench (worlds, bodies, 6) float64 commanded by the last action: force [N], torque [N m], world frame."""
         return self._advance.wrench
 
     @property
     def load(self) -> NDArray[np.float64]:
-        """(worlds, bodies, 6) float64: `wrench` with the gusts of the last step."""
+        """Load (worlds, bodies, 6) float64: `wrench` plus the gusts of the last step."""
         return self.wrench if self.disturbed is None else self.wrench + self.disturbed.load
 
     @property
@@ -214,12 +214,12 @@ class Task(Starts):
 
     @property
     def has_impulses(self) -> bool:
-        """An action may be an impulse."""
+        """True if an action may contain an impulse."""
         return self._advance.kick is not self._advance.wrench
 
     @cached_property
     def rollout_loop(self) -> RolloutLoop:
-        """The loop of a compiled task's rollouts, made with the first."""
+        """Loop of a compiled task's rollouts, made with the first rollout."""
         return RolloutLoop(self.world, self.wrench, self.frame_skip, self.world.dt)
 
     @cached_property
@@ -229,11 +229,11 @@ class Task(Starts):
 
     @property
     def action_vectors(self) -> list:
-        """Forces, torques and impulses that an action's numbers make, in their order."""
+        """Forces, torques and impulses made from an action's numbers, in their order."""
         return self._table.vectors
 
     def lines(self, world: int) -> tuple[str, ...]:
-        """Text for pictures of one world: the numbers that the task measures."""
+        """Lines of text for pictures of one world: the numbers that the task measures."""
         values = self.outcome[world, col.INFO :].tolist()
         return tuple(f"{name} {value:.2f}" for name, value in zip(self.measures, values))
 
@@ -243,7 +243,7 @@ class Task(Starts):
 
     @property
     def action_text(self) -> str:
-        """Vectors that an action makes, in words."""
+        """Vectors of an action, in words."""
         return ", ".join(vector.text for vector in self._table.vectors)
 
     @property
@@ -277,7 +277,7 @@ class Task(Starts):
         self.take(actions)
 
     def take(self, actions: np.ndarray) -> None:
-        """`step` with an array of the right shape; of one world its axis may be missing."""
+        """Take a `step` with an array of the right shape; the axis of a single world may be missing."""
         if actions.dtype.kind not in "fiub":
             raise ValueError(f"actions is {reprlib.repr(actions.tolist())}; allowed are numbers")
         if self._functions is not None:
@@ -294,16 +294,16 @@ class Task(Starts):
         return Before(self) if self.may_fail else None
 
     def take_back(self) -> None:
-        """Be as before the last control step: for one that is followed by a start that ends with an error."""
+        """Restore the state before the last control step, after a start that raised an error."""
         if self._before is not None:
             self._before.put_back()
 
     def not_finite(self, world: int) -> ValueError:
-        """Error for the action in `given` of a world."""
+        """Error for an action in `given` that is not finite, with its world."""
         return ValueError(f"action of world {world} is {self.given[world].tolist()}; allowed are finite numbers")
 
     def act(self) -> None:
-        """Move the worlds by one control step, under the actions in `given`."""
+        """Advance the worlds by one control step, under the actions in `given`."""
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
             raise self.not_finite(bad)
@@ -318,7 +318,7 @@ class Task(Starts):
         self.clock += 1
 
     def _prepare(self) -> None:
-        """Bind what belongs to this process: machine code, and views of arrays."""
+        """Bind machine code and views of arrays, which belong to this process."""
         table, advance = self._table, self._advance
         self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
@@ -335,31 +335,31 @@ class Task(Starts):
         }  # fmt: skip
 
     def state_arrays(self) -> dict[str, np.ndarray]:
-        """Arrays that decide how episodes go on, the worlds apart, by name; each has a row for each world."""
+        """Arrays that decide the future of episodes, apart from the world's, by name; each has a row for each world."""
         return {**self.kept_arrays, "steps": self.steps}
 
     @cached_property
     def settings_of_state(self) -> dict[str, Any]:
-        """Settings that must be the same where a state goes on, by name."""
+        """Settings that must agree where a state is restored, by name."""
         return state_settings(self)
 
     def own_settings(self) -> dict[str, Any]:
-        """Settings of a kind of tasks that decide how episodes go on, by name: a state goes on where they are the same.
+        """Settings of a kind of tasks that decide the future of episodes, by name; a state needs equal ones.
 
-        Scene, actions and time need not be among them.
+        They need not include scene, actions and time.
         """
         return {}
 
     def own_arrays(self) -> dict[str, np.ndarray]:
-        """More arrays of a kind of tasks that a step renews, by name, with a row for each world."""
+        """Further arrays of a kind of tasks that a step renews, by name, with a row for each world."""
         return {}
 
     def set_outcome(self, outcome: np.ndarray) -> None:
-        """Take an array for outcomes, once it is known how many numbers they have."""
+        """Take an array for outcomes, once the number of their numbers is known."""
         self.outcome = self.kept_arrays["outcome"] = outcome
 
     def adopt(self, rows: np.ndarray, steps: np.ndarray) -> None:
-        """Take over how many control steps (n,) the episodes in worlds `rows` have had."""
+        """Take over the number of control steps (n,) of the episodes in worlds `rows`."""
         self._began[rows] = self.clock - steps
 
     def __getstate__(self):

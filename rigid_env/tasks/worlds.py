@@ -1,4 +1,4 @@
-"""The worlds that a task's functions are asked about, as arrays with one row for each."""
+"""Worlds as a task's functions see them: arrays with one row for each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rigid_env.tasks.reading import write_rotations, write_wall_gaps
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """View of an array that cannot be written."""
+    """Read-only view of an array."""
     view = array.view()
     view.flags.writeable = False
     return view
@@ -23,8 +23,8 @@ def read_only(array: np.ndarray) -> np.ndarray:
 class Worlds:
     """Worlds of a task: all of them in a step, or those whose episodes begin.
 
-    Arrays are views of the running simulation where all worlds are meant: copy what is to be kept. What takes time to
-    work out is worked out when it is first read, once in a step.
+    Arrays for all worlds are views of the running simulation: copy them to keep them. Slow quantities are computed when
+    they are first read, once in a step.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Worlds:
         self.renew()
 
     def renew(self) -> None:
-        """Forget what was worked out: the worlds have moved."""
+        """Clear cached values, since the worlds have moved."""
         self.success = self.failure = np.zeros(len(self.indices), dtype=np.bool_)
         self.measured: Mapping[str, np.ndarray] = {}
         self._found: dict[str, np.ndarray] = {}
@@ -105,7 +105,7 @@ class Worlds:
         return self._contacts_of(contact_rows(self._task.world))
 
     def contacts_of(self, body: int, count: int) -> Contacts:
-        """Contacts of one body, which is their first body: the `count` with the largest forces."""
+        """Contacts of one body, always as the first body: the `count` with the largest forces."""
         return self._contacts_of(count, body)
 
     def _contacts_of(self, *chosen: int) -> Contacts:

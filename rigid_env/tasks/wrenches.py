@@ -1,4 +1,4 @@
-"""Compiled part of acting: from the numbers of an action to the wrenches on bodies."""
+"""Compiled conversion of an action's numbers to the wrenches on bodies."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _number(actions, i, k):
 
 @kernel
 def write_wrench(i, actions, table, points, limits, state, wrench, kick):
-    """Wrenches of world i from row i of `actions`; arguments as of `write_wrenches`."""
+    """Write the wrenches of world i from row i of `actions`; arguments as of `write_wrenches`."""
     bodies = wrench.shape[1]
     for b in range(bodies):
         for k in range(6):

@@ -1,4 +1,4 @@
-"""Documentation that a class's docstring writes out by hand, in Gymnasium's sections, and its parts."""
+"""Read the documentation that a class's docstring writes out by hand, by Gymnasium's sections."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ class Part:
 
     @property
     def text(self) -> tuple[str, ...]:
-        """All paragraphs."""
+        """All paragraphs as one text."""
         return (*self.before, *self.after)
 
 
 def written_parts(documented: type) -> dict[str, Part]:
-    """Sections of a class's docstring, by title; none where it has no headings."""
+    """Sections of a class's docstring by title; none where it has no headings."""
     doc = inspect.cleandoc(documented.__doc__ or "")
     _, *rest = re.split(r"^## (.+)$", doc, flags=re.MULTILINE)
     return {title: _part(body) for title, body in zip(rest[::2], rest[1::2])}
 
 
 def sentences(paragraphs: tuple[str, ...], is_kept: Callable[[str], bool]) -> tuple[str, ...]:
-    """Paragraphs without the sentences that are not kept, and without those that are then empty."""
+    """Paragraphs without rejected sentences, and without paragraphs that are then empty."""
     found = (" ".join(filter(is_kept, SENTENCE_END.split(text))) for text in paragraphs)
     return tuple(filter(None, found))
 

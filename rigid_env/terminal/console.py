@@ -1,4 +1,4 @@
-"""The console that every program prints to, and its progress bars."""
+"""Console and progress bars of all programs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def make_console() -> Console:
 
 
 def progress_bar(console: Console, has_thread: bool = True) -> Progress:
-    """Make a progress bar that goes away at its end.
+    """Make a progress bar that disappears at its end.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def progress_bar(console: Console, has_thread: bool = True) -> Progress:
 
 
 def say(console: Console, label: str, text: str | Text) -> None:
-    """Print a line with a label; further lines, in a narrow terminal, begin under its text."""
+    """Print a line with a label; in a narrow terminal, further lines begin under its text."""
     line = Table.grid(padding=(0, 1, 0, 0))
     line.add_column(width=LABEL_WIDTH, no_wrap=True)
     line.add_column(overflow="fold")

@@ -8,7 +8,7 @@ import typer
 
 
 def run_program(main: Callable) -> None:
-    """Run a function as the program: its parameters are the command line, its docstring the help.
+    """Run a function as a program; its parameters are the command line, its docstring the help.
 
     Without markup, as in the command line `rigid-env`: square brackets are printed, and an error is one line.
     """

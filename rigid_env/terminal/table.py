@@ -43,7 +43,7 @@ class Column:
 
     @property
     def may_break(self) -> bool:
-        """True if its text may go on in the next line."""
+        """True if the column's text may continue in the next line."""
         return not (self.is_number or self.is_whole)
 
 
@@ -104,7 +104,7 @@ class Table:
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[Text]], available: int) -> list[int] | None:
-    """Widths of the columns, or None where something would be broken that must not be."""
+    """Widths of the columns, or None where unbreakable text would be broken."""
     naturals = [max(map(_line_width, texts)) for texts in _by_column(columns, rows)]
     widths = [
         max(_word_width(texts), min(natural, READABLE)) if column.may_break else natural
@@ -132,7 +132,7 @@ def _line_width(text: Text) -> int:
 
 
 def _stacked(columns: Sequence[Column], rows: Sequence[Sequence[Text]]) -> tuple[list[Column], list[list[Text]]]:
-    """The same with every column that has an `under` as further lines of that one."""
+    """Table in which columns with an `under` become further lines of that column."""
     kept = [k for k, column in enumerate(columns) if column.under is None]
     names = [column.name for column in columns]
 
@@ -159,7 +159,7 @@ def _grid(columns: Sequence[Column], rows: Sequence[Sequence[Text]], widths: Seq
 
 
 def _listed(columns: Sequence[Column], rows: Iterable[Sequence[Text]]) -> Iterator[RichTable | Text]:
-    """A line for each cell, its column's name before it."""
+    """Lines of the table, one for each cell, with its column's name before it."""
     names = [Text(" ".join(column.name.split()), style="bold") for column in columns]
     for row in rows:
         lines = RichTable.grid(padding=(0, GAP, 0, 0))

@@ -20,7 +20,7 @@ LINE = 0.011
 """Width of a line, in units of the largest body."""
 
 COILS, COIL_POINTS, COIL_RADIUS = 9, 12, 0.03
-"""Of a spring: its turns, the points of each, and the radius in units of the largest body."""
+"""Turns of a spring, points of each turn, and its radius in units of the largest body."""
 
 
 class Nodes:

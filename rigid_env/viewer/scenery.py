@@ -33,7 +33,7 @@ FLOOR_SHADOW = 0.3
 FADE_STRENGTH = 0.6
 
 SHADE, SHADE_DISTANCE, SHADE_REACH = 0.02, 40.0, 9.0
-"""Of the lamp that casts shadows: its strength, distance and the radius that it lights [drawn units]."""
+"""Strength and distance of the lamp that casts shadows, and the radius that it lights [drawn units]."""
 
 SATURATION = 1.6
 """Exponent by which the weaker channels of a colour are made weaker: viser's tone mapping pales every colour."""

@@ -17,7 +17,7 @@ from rigid_env.extras import require
 LOOPBACK = "127.0.0.1"
 
 PORT = 8080
-"""Of viewers."""
+"""Port at which a viewer listens."""
 
 PORTS, LAST_PORT = 1000, 65_535
 """Ports that are tried, one after the other, and the last one that there is."""

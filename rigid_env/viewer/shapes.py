@@ -15,7 +15,7 @@ from rigid_env.rendering.meshes import BLOCK_FACES, Mesh, block_mesh, ellipsoid_
 from rigid_env.rendering.solids import OCTANT_LIGHTENING
 
 SUBDIVISIONS = 10
-"""Of a round body's octants."""
+"""Subdivisions of each octant of a round body's mesh."""
 
 RIM_SHARE = 0.035
 """Width of a rim: part of the way from a corner of a face to its middle."""

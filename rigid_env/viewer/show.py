@@ -13,7 +13,7 @@ from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
 
 DURATION, FRAMES = 10.0, 30.0
-"""Of an exported run [s], [1/s]."""
+"""Duration of an exported run [s] and its pictures per second [1/s]."""
 
 
 def looks(session: Session, duration: float) -> Iterator[Look]:

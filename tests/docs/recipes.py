@@ -1,4 +1,4 @@
-"""Recipes of `docs/architecture.md`, carried out from their text on a copy of the packages.
+"""Recipes of `docs/extending.md`, carried out from their text on a copy of the packages.
 
 A Python block that begins with ``# new file: PATH`` is that file, and one that begins with ``# proof.py`` the program
 that proves the recipe. A diff block begins with ``--- PATH``; its hunks, between lines ``@@``, have no line numbers:
@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tests.docs.snippets import ROOT
 
-PAGE = ROOT / "docs" / "architecture.md"
+PAGE = ROOT / "docs" / "extending.md"
 PACKAGES = ("physics", "rigid_env", "agents")
 NEW_FILE = "# new file: "
 PROOF = "# proof.py"

@@ -21,6 +21,7 @@ else:
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+RECIPES = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
 
 
 def listed(heading: str) -> list[str]:
@@ -43,10 +44,11 @@ def test_it_lists_every_folder_in_the_order_of_the_levels(heading, folder):
     assert listed(heading) == [name for name in levels if name in folders]
 
 
-def test_files_that_it_names_are_there():
-    named = re.findall(r"`((?:physics|rigid_env)/[\w/]+\.py)`", PAGE)
+@pytest.mark.parametrize("page", [PAGE, RECIPES], ids=["map", "recipes"])
+def test_files_that_it_names_are_there(page):
+    named = re.findall(r"`((?:physics|rigid_env)/[\w/]+\.py)`", page)
     assert len(named) >= 7
-    new = re.findall(r"^# new file: (.+)$", PAGE, re.MULTILINE)
+    new = re.findall(r"^# new file: (.+)$", page, re.MULTILINE)
     assert [name for name in named if not (ROOT / name).is_file() and name not in new] == []
 
 

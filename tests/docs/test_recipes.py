@@ -1,4 +1,4 @@
-"""The recipes of `docs/architecture.md` do what they say, carried out from their text."""
+"""The recipes of `docs/extending.md` do what they say, carried out from their text."""
 
 from __future__ import annotations
 

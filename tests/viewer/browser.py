@@ -21,7 +21,7 @@ ARGUMENTS = (
     "--ignore-gpu-blocklist", "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--no-first-run",
 )  # fmt: skip
-"""Of Chromium: WebGL in software, and nothing on its own account over the network."""
+"""Arguments of Chromium: WebGL in software, and no requests of its own over the network."""
 
 SIZE = {"width": 640, "height": 400}
 """[px]. Small, as every pixel is drawn in software."""

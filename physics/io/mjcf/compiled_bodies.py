@@ -1,4 +1,4 @@
-"""Free bodies of a compiled model: a body with a free joint, and all that is fixed to it."""
+"""Free bodies of a compiled model: a body with a free joint, and all bodies fixed to it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SINGLE = 1e-6
 
 
 class FreeBody(NamedTuple):
-    """A body of the scene, and where it is in the model.
+    """A body of the scene, and its elements in the model.
 
     Attributes
     ----------
@@ -59,12 +59,12 @@ def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[FreeBod
 
 
 def parts_of(model: Model, root: int) -> list[int]:
-    """The body of a free joint, and all that are fixed to it."""
+    """Body of a free joint, and all bodies fixed to it."""
     return np.flatnonzero(model.data.body_weldid == root).tolist()
 
 
 def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
-    """Bodies with a free joint and no other joint in their tree; the other joints are left out."""
+    """Bodies with a free joint and no other joint in their tree; trees with other joints are left out."""
     m = model.data
     kinds = [model.kind("mjtJoint", "mjJNT_", kind) for kind in m.jnt_type]
     trees = m.body_rootid[m.jnt_bodyid].tolist()
@@ -105,7 +105,7 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Free
 
 
 def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Pose (7,) and velocity (6,) of the first keyframe; without one the pose of the model, at rest."""
+    """Pose (7,) and velocity (6,) of the first keyframe; without one, the model's pose at rest."""
     m = model.data
     q, v = int(m.jnt_qposadr[joint]), int(m.jnt_dofadr[joint])
     if m.nkey:
@@ -114,7 +114,7 @@ def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int:
-    """The one geom of a body that can touch others, or the one that it has."""
+    """The single geom of a body that can touch others, or its only geom."""
     m = model.data
     geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
     able = [g for g in geoms if touching.may_touch(g)]
@@ -140,7 +140,7 @@ def _placing(model: Model, b: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _tensor(model: Model, b: int) -> np.ndarray:
-    """(3, 3) inertia about the centre of mass in the body's frame; the file's own digits, where it states them."""
+    """Inertia (3, 3) about the centre of mass in the body's frame, with the file's own digits where it states them."""
     m, spec = model.data, model.spec("body", b)
     R = rotation_matrices(m.body_iquat[b])
     compiled = R @ np.diag(m.body_inertia[b]) @ R.T
@@ -158,7 +158,7 @@ def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
 
 
 def _points(model: Model, geom: int) -> np.ndarray:
-    """(n, 3) corners of the convex hull of a mesh in the body's frame [m]; the file's own digits, where it has them."""
+    """Corners (n, 3) of a mesh's convex hull in the body's frame [m], with the file's own digits where it has them."""
     m, mesh, frame = model.data, int(model.data.geom_dataid[geom]), model.geom_frames[geom]
     corners, stated = _corners(model, mesh), model.stated_points(mesh)
     if stated is not None:
@@ -171,7 +171,7 @@ def _points(model: Model, geom: int) -> np.ndarray:
 
 
 def _corners(model: Model, mesh: int) -> np.ndarray:
-    """(n, 3) corners of the convex hull of a mesh in its own frame, as MuJoCo keeps it; else all its points."""
+    """Corners (n, 3) of the convex hull of a mesh in its own frame, as MuJoCo keeps it; else all its points."""
     m, start, graph = model.data, int(model.data.mesh_vertadr[mesh]), int(model.data.mesh_graphadr[mesh])
     points = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
     if graph < 0:

@@ -1,4 +1,4 @@
-"""From a model that MuJoCo compiles to a scene."""
+"""Convert a model compiled by MuJoCo to a scene."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _fixed_geoms(model: Model) -> list[int]:
 
 
 def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
-    """Fixed planes that a body touches; other fixed geoms that one touches are left out."""
+    """Fixed planes that a body touches; other fixed geoms with contact are left out."""
     met = []
     for geom in _fixed_geoms(model):
         if not touched(touching.surface(geom), bodies, touching.friction_of):
@@ -85,7 +85,7 @@ def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -
 
 
 def _wall(model: Model, plane: int) -> HalfSpace:
-    """A plane's free side is its +z."""
+    """Wall of a plane, whose free side is its +z."""
     frame, spec = model.geom_frames[plane], model.spec("geom", plane)
     wall = HalfSpace(frame.R[:, 2])
     stated = np.array(spec.alt.zaxis) if spec is not None else np.full(3, np.nan)

@@ -1,4 +1,4 @@
-"""From the geoms of a model to the contact and friction of a scene.
+"""Convert the geoms of a model to the contact and friction of a scene.
 
 In MuJoCo masks of bits and lists of pairs say which geoms touch, and every pair has its own friction. A scene has one
 coefficient, its bodies touch all walls or none, and each other all or none.
@@ -19,7 +19,7 @@ from physics.scene.effects import Contact, Friction
 
 @dataclass(frozen=True)
 class Surface:
-    """Properties of a geom in contact; geoms with equal ones behave alike.
+    """Properties of a geom in contact; geoms with equal properties behave alike.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ FrictionOf = Callable[[Surface, Surface], "float | None"]
 
 
 class _Met(NamedTuple):
-    """Surfaces that stand for `count` pairs of geoms, and the friction between them; None: they do not touch."""
+    """Surfaces of `count` pairs of geoms, and their friction; None: they do not touch."""
 
     a: Surface
     b: Surface
@@ -75,7 +75,7 @@ def dynamic_friction(a: Surface, b: Surface) -> float | None:
 
 
 def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf = dynamic_friction) -> bool:
-    """True if any of the others touches the surface."""
+    """True if any of the other surfaces touches this one."""
     return any(friction_of(surface, other) is not None for other in others)
 
 
@@ -114,7 +114,7 @@ def contact_effects(
 
 
 def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
-    """True if pairs touch; where some do and others do not, that is left out."""
+    """True if pairs touch; where only some do, the others are left out."""
     touching = [pair for pair in met if pair.friction is not None]
     apart = [pair for pair in met if pair.friction is None]
     if touching and apart:
@@ -130,7 +130,7 @@ def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
 
 
 def _agreed_friction(met: list[_Met], left: LeftOut) -> float:
-    """Friction of all pairs that touch; where it differs, that of most pairs, and it is left out."""
+    """Friction of all pairs that touch; where it differs, most pairs decide and the rest is left out."""
     number: Counter[float] = Counter()
     first: dict[float, _Met] = {}
     for pair in met:

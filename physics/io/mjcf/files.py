@@ -1,4 +1,4 @@
-"""MJCF files: written for MuJoCo, and read by it where it is installed, else by a reader of what is written here."""
+"""Read and write MJCF files: with MuJoCo where it is installed, else by a reader of the files written here."""
 
 from __future__ import annotations
 
@@ -82,12 +82,12 @@ def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list
 
 
 def from_mjcf(text: str, source: str = "model") -> Scene:
-    """The scene of an MJCF text; `source` is what messages call it."""
+    """Make the scene of an MJCF text; messages name the text `source`."""
     return read_mjcf(text, source)[0]
 
 
 def read_mjcf(text: str, source: str, drop: bool = False, path: Path | None = None) -> tuple[Scene, list[str]]:
-    """Scene of a text, and what was left out; files that the model names are looked for beside `path`."""
+    """Scene of a text, and the list of elements left out; files that the model names are searched beside `path`."""
     mujoco = find_optional("mujoco", LEAST_MUJOCO)
     if drop and mujoco is None:
         raise missing("mujoco", "load_mjcf with drop=True")

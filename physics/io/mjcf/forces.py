@@ -1,4 +1,4 @@
-"""Forces of a compiled model on its free bodies: gravity and damping, and those that a scene does not have."""
+"""Forces of a compiled model on its free bodies: gravity, damping, and forces that a scene lacks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ABSENT = {"tendon": "tendons", "actuator": "actuators", "flex": "deformable bodi
 
 
 def absent(model: Model) -> Iterator[ModelError]:
-    """Elements that have no counterpart in a scene."""
+    """Elements without a counterpart in a scene."""
     m = model.data
     numbers = {"tendon": m.ntendon, "actuator": model.value("nactuator", m.nu), "flex": m.nflex}
     for kind, number in numbers.items():
@@ -39,7 +39,7 @@ def absent(model: Model) -> Iterator[ModelError]:
 
 
 def _is_passive_off(model: Model) -> bool:
-    """True if all passive forces are disabled: by a flag of older versions, or where springs and dampers both are."""
+    """True if all passive forces are disabled, by a flag of older versions or by disabled springs and dampers."""
     return model.disables("PASSIVE") or (model.disables("SPRING") and model.disables("DAMPER"))
 
 
@@ -50,7 +50,7 @@ def _option_error(model: Model, tag: str, key: str, message: str) -> ModelError:
 
 
 def gravity(model: Model, free: list[FreeBody], left: LeftOut) -> list[Gravity]:
-    """Gravity, less the share of it that the model compensates, where that is the same of all bodies."""
+    """Gravity minus the share of it that the model compensates, if that is equal for all bodies."""
     m = model.data
     if model.disables("GRAVITY"):
         return []
@@ -69,7 +69,7 @@ def gravity(model: Model, free: list[FreeBody], left: LeftOut) -> list[Gravity]:
 
 
 def damping(model: Model, free: list[FreeBody], left: LeftOut) -> list[Any]:
-    """Drag that is linear in the velocity, where it is that of the damping of all free joints."""
+    """Linear drag with the damping of the free joints, if that is equal for all."""
     m = model.data
     found = {each.joint: _damping(model, each.joint) for each in free}
     if model.disables("DAMPER", "PASSIVE") or not any(map(np.any, found.values())):
@@ -94,7 +94,7 @@ def _damping(model: Model, joint: int) -> np.ndarray:
 
 
 def joint_faults(model: Model, free: list[FreeBody]) -> Iterator[ModelError]:
-    """Properties of free joints that a scene has not."""
+    """Properties of free joints that a scene lacks."""
     m = model.data
     tables = {
         "armature": m.dof_armature,

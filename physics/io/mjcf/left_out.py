@@ -6,7 +6,7 @@ from physics.io.mjcf.text import ModelError
 
 
 class LeftOut:
-    """Parts of a model that no scene holds.
+    """Parts of a model that no scene can hold.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class LeftOut:
         self.messages: list[str] = []
 
     def add(self, error: ModelError) -> None:
-        """Raise the error, or list it."""
+        """Raise the error, or add it to the list."""
         if not self.drop:
             raise ModelError(f"{error}; load_mjcf(path, drop=True) reads the rest", error.line)
         self.messages.append(f"{error.place}: {error}" if error.place else str(error))

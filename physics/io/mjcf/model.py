@@ -1,4 +1,4 @@
-"""A model that MuJoCo has compiled: names, lines and frames of its elements."""
+"""A model compiled by MuJoCo: names, lines and frames of its elements."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ PARSED = (".xml", ".urdf")  # endings of files that MuJoCo opens
 
 
 class Frame(NamedTuple):
-    """Origin (3,) [m] and unit quaternion (4,) of a frame in another one."""
+    """Origin (3,) [m] and unit quaternion (4,) of a frame in another frame."""
 
     pos: np.ndarray
     quat: np.ndarray
 
     def __matmul__(self, inner: Frame) -> Frame:
-        """The frame `inner`, given in this one, where this one is given."""
+        """Frame `inner`, given in this frame, in the outer frame of this one."""
         return Frame(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
 
     @property
     def inverse(self) -> Frame:
-        """The frame in which this one was given, in this one."""
+        """Outer frame, given in this frame."""
         return Frame(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
 
     @property
@@ -85,37 +85,37 @@ class Model:
         return self.frames[self.data.body_parentid[b]]
 
     def moves(self, b: int) -> bool:
-        """True if the body, or the one that it is fixed to, has a joint."""
+        """True if the body, or the body that it is fixed to, has a joint."""
         return bool(self.data.body_dofnum[self.data.body_weldid[b]] > 0)
 
     def value(self, name: str, default: Any) -> Any:
-        """An array of the model; the default where this version of MuJoCo has none."""
+        """Array of the model, or the default if this version of MuJoCo lacks it."""
         return getattr(self.data, name, default)
 
     def disables(self, *flags: str) -> bool:
-        """True if any of these is disabled, such as "GRAVITY"."""
+        """True if any of these features is disabled, such as "GRAVITY"."""
         bits = [getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0) for flag in flags]
         return any(self.data.opt.disableflags & int(bit) for bit in bits)
 
     def enables(self, flag: str) -> bool:
-        """True if this is enabled, such as "OVERRIDE"."""
+        """True if this feature is enabled, such as "OVERRIDE"."""
         bit = getattr(self._mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)
         return bool(self.data.opt.enableflags & int(bit))
 
     def kind(self, enumeration: str, prefix: str, number: int) -> str:
-        """Name of a value of one of MuJoCo's enumerations, such as the type of a geom."""
+        """Name of a value in one of MuJoCo's enumerations, such as the type of a geom."""
         return getattr(self._mujoco, enumeration)(int(number)).name.removeprefix(prefix).lower()
 
     def spec(self, kind: str, k: int) -> Any:
-        """Element `k` of a kind as MuJoCo has read it; None where it made the element itself."""
+        """Element `k` of a kind as MuJoCo has read it; None if MuJoCo made the element itself."""
         return self._found[kind].get(k)
 
     def name(self, kind: str, k: int) -> str:
-        """Name of an element; empty if it has none."""
+        """Name of an element; empty without one."""
         return self._mujoco.mj_id2name(self.data, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), k) or ""
 
     def label(self, kind: str, k: int) -> str:
-        """Element as messages call it; a part of a body without a name is told by that of its body."""
+        """Element in the words of messages; a nameless part of a body goes by the name of the body."""
         name = self.name(kind, k)
         if name or kind not in ("geom", "joint"):
             return label(kind, name)
@@ -123,14 +123,14 @@ class Model:
         return f"{label(kind, name)} of {label('body', self.name('body', body))}" if body else label(kind, name)
 
     def line(self, kind: str, k: int) -> int:
-        """Line of an element; 0 where it is not known, as in a file that another one includes."""
+        """Line of an element; 0 if unknown, as in an included file."""
         found = re.search(r"line (\d+)", getattr(self.spec(kind, k), "info", "") or "")
         if not found and kind == "joint":
             return self.line("body", int(self.data.jnt_bodyid[k]))
         return int(found.group(1)) if found else 0
 
     def stated_points(self, mesh: int) -> np.ndarray | None:
-        """(n, 3) points of a mesh as the text states them; None where it names a file."""
+        """Points (n, 3) of a mesh as the text states them; None if it names a file."""
         for element in self.root.iter("mesh"):
             if element.get("name") == self.name("mesh", mesh) and element.get("vertex"):
                 return np.array(element.get("vertex", "").split(), dtype=float).reshape(-1, 3)
@@ -170,7 +170,7 @@ def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | Non
 
 
 def _refusal(message: str, root: Element) -> ModelError:
-    """MuJoCo's own message as an error, with the value of the attribute that it names."""
+    """Error with MuJoCo's own message, and the value of the attribute that it names."""
     told = ", ".join(line.strip() for line in message.splitlines() if line.strip())
     place, attribute = re.search(r", line (\d+)", told), re.search(r"attribute:? '(\w+)'", told)
     line = int(place.group(1)) if place else 0
@@ -184,7 +184,7 @@ def _refusal(message: str, root: Element) -> ModelError:
 
 @contextlib.contextmanager
 def _told_warnings(mujoco: ModuleType) -> Iterator[None]:
-    """Let MuJoCo warn once in Python, and not in a file of its own, which it makes in the working folder."""
+    """Let MuJoCo warn once in Python instead of in a log file in the working folder."""
     before, told = mujoco.get_mju_user_warning(), []
     mujoco.set_mju_user_warning(told.append)
     try:

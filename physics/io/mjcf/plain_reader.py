@@ -1,4 +1,4 @@
-"""From the elements of an MJCF text to a scene, without MuJoCo: the part of MJCF that `save_mjcf` writes.
+"""Read a scene from an MJCF text without MuJoCo: the part of MJCF that `save_mjcf` writes.
 
 Elements and attributes of `ELEMENTS` are read, those of `HARMLESS` move nothing, and all others are refused.
 """
@@ -93,7 +93,7 @@ def _error(element: Element, message: str) -> ModelError:
 
 
 def _unread(element: Element, message: str) -> ModelError:
-    """An error about MJCF that MuJoCo would read."""
+    """Error about MJCF that only MuJoCo can read."""
     return _error(element, f"{message}; load_mjcf reads more where MuJoCo is installed: {INSTALLED_BY['mujoco'][1]}")
 
 
@@ -102,7 +102,7 @@ def _type(geom: Element) -> str:
 
 
 def _check(element: Element) -> None:
-    """Refuse attributes and elements that are not read."""
+    """Refuse attributes and elements that this reader ignores."""
     attributes, children = (text.split() for text in ELEMENTS[element.tag])
     for key, value in element.attrib.items():
         if key not in attributes and key not in HARMLESS_ATTRIBUTES:
@@ -153,7 +153,7 @@ def _refuse(element: Element, *keys: str) -> None:
 
 
 def _wall(plane: Element) -> HalfSpace:
-    """A plane's free side is its +z."""
+    """Wall of a plane, whose free side is its +z."""
     _refuse(plane, "mesh")
     if plane.get("quat") is not None:
         _refuse(plane, "zaxis")
@@ -177,7 +177,7 @@ def _normalised(element: Element, q: np.ndarray) -> np.ndarray:
 
 
 def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Pose (7,) and velocity (6,) of each body's frame, as in qpos and qvel of MuJoCo: of the first keyframe."""
+    """Pose (7,) and velocity (6,) of each body's frame in the first keyframe, as in qpos and qvel of MuJoCo."""
     key = root.find("keyframe/key")
     poses = [np.concatenate((_numbers(e, "pos", 3, "0 0 0"), _unit(e))) for e in elements]
     velocities = np.zeros((len(elements), 6))
@@ -190,7 +190,7 @@ def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np
 
 
 def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np.ndarray) -> Body:
-    """A free body; the scene's frame has its axes, and its origin at the centre of mass."""
+    """Free body; the scene's frame has its axes, and its origin at the centre of mass."""
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")

@@ -1,4 +1,4 @@
-"""Bodies of a scene from the masses and geoms of a model, whose frames lie elsewhere."""
+"""Make bodies of a scene from masses and geoms of a model, in other frames."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str 
 
 
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:
-    """A box, sphere or ellipsoid; its inertia is stated where it is not that of uniform density."""
+    """Make a box, sphere or ellipsoid; its inertia is stated if it is not that of uniform density."""
     half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
     moments = block_moments(2 * half, mass) if placed.kind == "box" else ellipsoid_moments(half, mass)
     is_uniform = _is_near(placed.mass.inertia, np.diag(moments), UNIFORM)
@@ -92,7 +92,7 @@ def _is_rounding(arm: np.ndarray, placed: Placed) -> bool:
 
 
 def _hull(placed: Placed, start: dict[str, Any]) -> Body:
-    """The convex hull of points, whose own centre of mass must be the body's."""
+    """Make the convex hull of points; its own centre of mass must be the body's."""
     mass, points = placed.mass.mass, tuple(map(tuple, (placed.pos + placed.shape).tolist()))
     fault = _hull_fault(points)
     if fault:
@@ -111,7 +111,7 @@ def _hull(placed: Placed, start: dict[str, Any]) -> Body:
 
 @lru_cache(maxsize=64)
 def _hull_fault(points: tuple) -> str:
-    """Reason why points have no hull here; empty where they have. Bodies share their mesh: it is kept."""
+    """Reason why points have no hull here, else empty; the result is cached, since bodies share their mesh."""
     try:
         convex_hull(points)
     except ValueError as error:

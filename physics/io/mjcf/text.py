@@ -13,7 +13,7 @@ class Element(ET.Element):
 
 
 class ModelError(ValueError):
-    """An element that a scene cannot hold.
+    """Error about an element that a scene cannot hold.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class ModelError(ValueError):
 
     @property
     def place(self) -> str:
-        """The line in words; empty where it is not known."""
+        """Line in words; empty if unknown."""
         return f"line {self.line}" if self.line else ""
 
 
@@ -62,5 +62,5 @@ def _refuse_doctype(name: str, *_: object) -> None:
 
 
 def label(tag: str, name: str | None) -> str:
-    """Element as messages call it."""
+    """Element in the words of messages."""
     return f"<{tag} {name!r}>" if name else f"<{tag}>"

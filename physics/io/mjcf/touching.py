@@ -1,4 +1,4 @@
-"""Geoms of a compiled model in contact: the friction of two, and what of it a scene cannot hold."""
+"""Contact of a compiled model's geoms: friction of pairs, and properties that a scene cannot hold."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Touching:
         self._special = self._told | {g for g in range(m.ngeom) if int(m.geom_bodyid[g]) in bodies}
 
     def may_touch(self, geom: int) -> bool:
-        """True unless nothing can touch the geom: it is there to be seen."""
+        """True unless the geom is only visible, and nothing can touch it."""
         m = self._model.data
         return bool(m.geom_contype[geom] or m.geom_conaffinity[geom] or geom in self._told)
 
@@ -75,7 +75,7 @@ class Touching:
         return a.geom != b.geom and frozenset(map(int, (bodies[a.geom], bodies[b.geom]))) in self._excluded
 
     def faults(self, geoms: Iterable[int]) -> Iterator[ModelError]:
-        """Contact of these geoms, all of which touch something, that is neither rigid nor with plain friction."""
+        """Properties of these touching geoms that are neither rigid contact nor plain friction."""
         known = set(geoms)
         for geom in sorted(known):
             for told in self._geom_faults(geom):
@@ -122,7 +122,7 @@ def _resistance(condim: int) -> Iterator[str]:
 
 
 def _softness(solref: np.ndarray, solimp: np.ndarray, margin: float, gap: float) -> Iterator[str]:
-    """Parameters of a contact that is softer or less damped than MuJoCo's default, or acts from afar."""
+    """Parameters of a contact that is softer or less damped than MuJoCo's default, or acts at a distance."""
     time, ratio = solref
     if not (time > 0 and ratio >= DAMPING_RATIO and time * ratio <= TIME_CONSTANT):
         allowed = f"a damping ratio of at least {DAMPING_RATIO:g}, and a product of at most {TIME_CONSTANT:g} s"

@@ -1,4 +1,4 @@
-"""From a scene to MJCF, as far as MuJoCo can express it.
+"""Convert a scene to MJCF, as far as MuJoCo can express it.
 
 Frames: a body's frame here is at its centre of mass, so the exported bodies have `inertial pos="0 0 0"`. A free joint
 turns in the body's frame there, in the world's here; the start velocities stand in a keyframe `start`.
@@ -21,12 +21,12 @@ KEYFRAME = "start"
 
 
 def unnamed(b: int) -> str:
-    """Name in MJCF of body `b` of a scene if it has none there."""
+    """MJCF name of body `b` of a scene if the body has no name."""
     return f"body{b}"
 
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
-    """The text that `save_mjcf` writes."""
+    """Text of the file that `save_mjcf` writes."""
     lost = _inexpressible(scene)
     if lost and not drop:
         raise ValueError(f"MJCF cannot express {', '.join(map(repr, lost))}; pass drop=True to leave that out")
@@ -55,7 +55,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 
 def _check_names(scene: Scene) -> None:
-    """Refuse a body's name that the file gives to a body without one."""
+    """Refuse a body's name that the file gives to a nameless body."""
     taken = {unnamed(b): b for b, body in enumerate(scene.bodies) if body.name is None}
     for b, body in enumerate(scene.bodies):
         if body.name in taken:
@@ -66,7 +66,7 @@ def _check_names(scene: Scene) -> None:
 
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
-    """Corners of the hulls, about their centres of mass."""
+    """Add the hulls' corners, relative to their centres of mass."""
     hulls: dict[str, Any] = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
     assets: Any = ET.SubElement(root, "asset") if hulls else None
     for name, body in hulls.items():
@@ -82,12 +82,12 @@ def _inexpressible(scene: Scene) -> list:
 
 
 def _text(numbers) -> str:
-    """Numbers to the last bit."""
+    """Numbers as text, exact to the last bit."""
     return " ".join(repr(float(number)) for number in np.ravel(numbers))
 
 
 def _surface(scene: Scene) -> dict[str, str]:
-    """Friction of all geoms: MuJoCo takes the larger of two, and condim 1 has none; 0 would count as 1e-5."""
+    """Friction of all geoms: MuJoCo takes the larger of two. condim 1 means none; 0 would count as 1e-5."""
     friction = scene.effect(Friction)
     if friction is None or friction.axis is not None or friction.coefficient == 0:
         return {"condim": "1"}
@@ -117,7 +117,7 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
 
 
 def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> None:
-    """A spring is a straight tendon from a site of the world, or of another body, to one of the body."""
+    """Add springs: straight tendons to a site of the body, from a site of the world or of another body."""
     tendons = ET.SubElement(root, "tendon")
     for k, spring in enumerate(springs):
         if spring.other is None:

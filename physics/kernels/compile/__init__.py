@@ -1,1 +1,1 @@
-"""The compiler: decorators of kernels, the cache of machine code, and what of Numba is extended."""
+"""The compiler: decorators of kernels, the cache of machine code, and extensions of Numba."""

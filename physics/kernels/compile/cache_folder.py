@@ -19,7 +19,7 @@ from physics.kernels.compile.notices import warn
 
 
 def is_checked() -> bool:
-    """Answer whether indices are checked: `NUMBA_BOUNDSCHECK=1`."""
+    """True if indices are checked: `NUMBA_BOUNDSCHECK=1`."""
     return os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
 
 
@@ -77,7 +77,7 @@ SOURCES = Path(__file__).parents[1]
 
 @cache
 def folder_name() -> str:
-    """Name of the folder, which tells these kernels and their compiler from all others."""
+    """Name of the folder, which identifies these kernels and their compiler."""
     checked = "-checked" if is_checked() else ""
     if COMPILER != FUSED:
         return f"{source_digest(SOURCES)}-{COMPILER}{checked}"
@@ -88,7 +88,7 @@ def folder_name() -> str:
 
 @cache
 def cache_dir() -> Path | None:
-    """Folder of the compiled kernels that belong to exactly these kernel sources, and check their indices or do not.
+    """Folder of the compiled kernels with these sources, and with or without checks of indices.
 
     None where there is no folder of this user's: then nothing is kept.
     """

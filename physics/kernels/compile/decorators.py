@@ -22,12 +22,12 @@ is_kernel, lend = backend.is_kernel, backend.lend
 
 
 def is_compiled(value) -> bool:
-    """True for a kernel, and for a function that somebody else has had compiled by Numba."""
+    """True for a kernel, and for a function that others have compiled by Numba."""
     return hasattr(value, "py_func")
 
 
 def plain_function(value):
-    """The Python function that something compiled was made of; any other value as it is."""
+    """Python function of a compiled one; any other value as it is."""
     return getattr(value, "py_func", value)
 
 
@@ -42,9 +42,9 @@ def kernel(function):
     `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
 
     Switches among the arguments are passed as ``None`` (off) or not (on). A kernel is compiled for the types of its
-    arguments, so that LLVM drops what is off. Numba prunes a branch on ``x is not None`` of an argument x that is None
-    before it infers types; of any other both branches have to have types. Where one has none, or is large, it stands in
-    a function that is chosen by the type of the switch (`if_given`).
+    arguments, so that LLVM drops effects that are off. Numba prunes a branch on ``x is not None`` of an argument x that
+    is None before it infers types; of any other both branches have to have types. Where one has none, or is large, it
+    stands in a function that is chosen by the type of the switch (`if_given`).
 
     A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
     take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).
@@ -53,42 +53,42 @@ def kernel(function):
 
 
 def entry_kernel(function):
-    """`kernel` that Python calls itself, not by way of `physics.parallel.bound_call`."""
+    """Compile a `kernel` that Python calls directly, without `physics.parallel.bound_call`."""
     return backend.entry(function)
 
 
 def cold_kernel(function):
-    """`kernel` that a step hardly ever needs: `fused` leaves a call of it.
+    """Compile a `kernel` that steps seldom need: `fused` does not inline it.
 
-    LLVM copies a function that is called from one place into its caller, however long it is. What always runs there
-    then has fewer registers for its numbers, and moves them to the stack and back.
+    LLVM copies a function with one call into its caller, however long it is. The caller's usual path then has fewer
+    registers for its numbers, and moves them to the stack and back.
     """
     function.is_cold = True
     return backend.part(function)
 
 
 def shared_kernel(function):
-    """`kernel` that all plans share: `fused` gives it machine code of its own (`fused.dispatcher`)."""
+    """Compile a `kernel` that all plans share: `fused` gives it its own machine code (`fused.dispatcher`)."""
     return backend.shared_part(function)
 
 
 def inlined(function):
-    """`kernel` of a few instructions, or with one caller: `fused` leaves no call of it."""
+    """Compile a `kernel` of a few instructions, or with one caller: `fused` inlines it."""
     return backend.inlined_part(function)
 
 
 def runtime_kernel(function):
-    """`inlined` without a place of its own on disk: made at run time, or by a user, and kept with what calls it."""
+    """Compile an `inlined` kernel made at run time, or by a user; it is kept on disk with its callers."""
     return backend.runtime_part(function)
 
 
 def user_kernel(function: Function) -> Function:
-    """`runtime_kernel` for a user's function: indices may count from the end; one outside raises IndexError."""
+    """Compile a `runtime_kernel` of a user's function, in which an index outside its axis raises IndexError."""
     return backend.user_part(function)
 
 
 def by_type(choose: Callable, about: Callable | None = None):
-    """Make a kernel that is another one for each type of its arguments.
+    """Make a kernel that dispatches to another kernel for each type of its arguments.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def by_type(choose: Callable, about: Callable | None = None):
 
 
 def when(is_chosen: Callable, otherwise=None):
-    """Make a function a kernel by type: called where `is_chosen` says so of the types of its arguments.
+    """Make a kernel that is chosen by type: it is called where `is_chosen` is true of the types of its arguments.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def when(is_chosen: Callable, otherwise=None):
 
 
 def if_given(switch: str, otherwise=None):
-    """Make a function a kernel that stands in place of its call where a switch is on, and `otherwise` does elsewhere.
+    """Make a kernel that is called where a switch is on; elsewhere `otherwise` takes its place.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
-"""Four numbers at once: what is done to one is done to each, in one instruction where the processor has one for it.
+"""Four numbers at once: an operation acts on each, in one instruction if the processor has one for it.
 
-A block rests on a wall with three or four vertices, and all of them are asked the same: how fast they slide, in what
-direction, what they push with. In kernels `Lanes` is a vector of LLVM's (`fused.simd_types`) or four numbers
-(`public.simd_types`). This module says what it means, and is what it is without a compiler. A number beside lanes is
-four of it. No result depends on the processor: each lane is what the number alone would be, and sums are taken in one
-order (`lane_sum`).
+A block rests on a wall with three or four vertices, which all need the same quantities: slip speed, direction, push. In
+kernels `Lanes` is a vector of LLVM (`fused.simd_types`) or four numbers (`public.simd_types`). This module defines it,
+and implements it without a compiler. A number beside lanes counts as four equal ones. No result depends on the
+processor: each lane has the result of a plain number, and sums are taken in one order (`lane_sum`).
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ LANE_COUNT = 4
 
 
 class Lanes:
-    """Four numbers, or what is true of each of four."""
+    """Four numbers, or four truth values."""
 
     __slots__ = ("each",)
 
@@ -40,18 +39,18 @@ class Lanes:
 
 
 def _each(of: Callable, *values) -> Lanes:
-    """A function of each lane of some values; of a number, of that."""
+    """Function applied to each lane of some values; a number counts as four equal lanes."""
     spread = [one.each if isinstance(one, Lanes) else (one,) * LANE_COUNT for one in values]
     return Lanes(*(of(*lane) for lane in zip(*spread, strict=True)))
 
 
 def _of_each_or_one(of: Callable, *values):
-    """`_each`, or a function of numbers where there are no lanes among them."""
+    """`_each`, or the function of numbers if no argument is lanes."""
     return _each(of, *values) if any(isinstance(one, Lanes) for one in values) else of(*values)
 
 
 def _divided(x, y) -> float:
-    """A quotient as kernels have it: infinite or no number where Python raises an exception."""
+    """Quotient as in kernels: infinity or NaN where Python raises an exception."""
     with np.errstate(all="ignore"):
         return float(np.float64(x) / np.float64(y))
 
@@ -83,45 +82,45 @@ def _root(x) -> float:
 
 
 def lane_sqrt(x):
-    """Square roots; of a negative number, no number. Of a number that is not lanes, a number."""
+    """Square roots; NaN of a negative number. A plain number gives a plain number."""
     return _each(_root, x) if isinstance(x, Lanes) else _root(x)
 
 
 def larger(x, y):
-    """The larger of two, each on its own: y where it is larger, as `max(x, y)` has it. Of two numbers, a number."""
+    """The larger of each two numbers: y where it is larger, as in `max(x, y)`. Two plain numbers give a number."""
     return _of_each_or_one(max, x, y)
 
 
 def smaller(x, y):
-    """The smaller of two, each on its own: `min(x, y)`."""
+    """The smaller of each two numbers, as in `min(x, y)`."""
     return _of_each_or_one(min, x, y)
 
 
 def select_lanes(where, x, y):
-    """x where something is true, else y; of a truth and two numbers, one of them."""
+    """x where a lane is true, else y; for a plain truth value, one of two numbers."""
     return _of_each_or_one(lambda true, one, other: one if true else other, where, x, y)
 
 
 def lane_sum(x):
-    """Sum of all four: first those two apart, which is also the first half and the second half."""
+    """Sum of all four lanes: first those two apart, which is also the first half and the second half."""
     return (x[0] + x[2]) + (x[1] + x[3])
 
 
 def lane_sums(a, b, c, d):
-    """`lane_sum` of each of four lanes."""
+    """Sums (`lane_sum`) of four lanes."""
     return Lanes(*(lane_sum(_each(float, one)) for one in (a, b, c, d)))
 
 
 def max_of_lanes(x):
-    """The largest of all four."""
+    """The largest of all four lanes."""
     return max(max(x[0], x[2]), max(x[1], x[3]))
 
 
 def min_of_lanes(x):
-    """The least of all four."""
+    """The least of all four lanes."""
     return min(min(x[0], x[2]), min(x[1], x[3]))
 
 
 def first_true_lane(where):
-    """The first lane of which something is true, or -1."""
+    """Index of the first true lane, or -1."""
     return next((k for k in range(LANE_COUNT) if where[k]), -1)

@@ -1,4 +1,4 @@
-"""Examine a user's function before anything moves: the words that all compilers use for what they find."""
+"""Examine a user's function before a step: results and errors of all compilers in one form."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Examined(NamedTuple):
 
 
 class FaultyFunctionError(Exception):
-    """A function reads or changes something that it may not.
+    """Error about a function that reads or changes something forbidden.
 
     Parameters
     ----------
@@ -46,12 +46,12 @@ class FaultyFunctionError(Exception):
 
 
 def entries(size: int) -> str:
-    """Numbers that p has, in words."""
+    """Number of p's entries, in words."""
     return f"p[0] to p[{size - 1}]" if size > 1 else "p[0]" if size else "none"
 
 
 def in_words(form: str | tuple) -> str:
-    """A form in words."""
+    """Form of a value, in words."""
     if isinstance(form, str):
         return form
     if form and all(each == NUMBER for each in form):
@@ -60,7 +60,7 @@ def in_words(form: str | tuple) -> str:
 
 
 def form_of(value) -> str | tuple:
-    """Form of a value that a function returned."""
+    """Form of a value returned by a function."""
     if isinstance(value, tuple):
         return tuple(map(form_of, value))
     if value is None:
@@ -75,7 +75,7 @@ def form_of(value) -> str | tuple:
 
 
 def probe(function: Callable, called: Callable, arguments: tuple, numbers: str) -> str | tuple | None:
-    """Call a function once; the form of its result, or None where it raised an exception of its own.
+    """Call a function once and return the form of its result, or None if it raised an exception of its own.
 
     Parameters
     ----------

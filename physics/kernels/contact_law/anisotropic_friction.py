@@ -81,7 +81,7 @@ def _as_it_is(vector, axes, work):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def unstretch_force(f, axes, work):
-    """S⁻¹ f: a force whose size along the wall is to be held against μ1 times the push; `axes` are the wall's."""
+    """S⁻¹ f of a force f, whose size along the wall is then compared with μ1 times the push; `axes` are the wall's."""
     k = friction_ratio(work)
     s = (1.0 / k - 1.0) * qt.dot(axes[2], f)
     return f[0] + s * axes[2][0], f[1] + s * axes[2][1], f[2] + s * axes[2][2]
@@ -89,7 +89,7 @@ def unstretch_force(f, axes, work):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def sliding_direction(d, axes, work):
-    """S² d/|S d|: what friction of sliding along the unit vector d is -μ1 f_n times of; d itself on an even wall."""
+    """Vector S² d/|S d| for sliding along the unit vector d: friction is -μ1 f_n times it; d on an even wall."""
     k = friction_ratio(work)
     a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)
     size = math.sqrt(a * a + b * b)

@@ -136,7 +136,7 @@ def _as_it_ends(n, y, end, h, offset_frame, report, work):
 
 @inlined
 def _lifted(n, x, R, share, offset_frame, work):
-    """x moved out of the walls until no point is deeper than `share` of what its spring is due to be."""
+    """Position x moved out of the walls until no point is deeper than `share` of its spring's due depth."""
     least = NEGLIGIBLE_SLOP_SHARE * work.slop
     for i in range(n):
         lift = share * min(work.end_gap[i], 0.0) - feature_gap(work.slot[i], x, R, offset_frame, work)
@@ -147,7 +147,7 @@ def _lifted(n, x, R, share, offset_frame, work):
 
 @inlined
 def _work_of_loads(y, end, h, offset_frame, work):
-    """Work that the loads which are held have done from y to `end`, and what the motion has lost [J]."""
+    """Work of the held loads from y to `end`, and loss of kinetic energy [J]."""
     a, T, v, L = work.free_acceleration, work.torque, end[2], end[3]
     d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
     lost = kinetic_energy(y[1], y[2], y[3], work, offset_frame) - kinetic_energy(end[1], v, L, work, offset_frame)
@@ -170,7 +170,7 @@ def _stored(n, x, R, offset_frame, work):
 
 @inlined
 def _without_excess(y, end, excess, h, offset_frame, report, work):
-    """`end` without the energy `excess` [J] that came from nowhere, if that is more than the stage and its solve miss.
+    """State `end` without the created energy `excess` [J], if that exceeds the errors of the stage and its solve.
 
     Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
     """
@@ -189,11 +189,12 @@ def _without_excess(y, end, excess, h, offset_frame, report, work):
 
 @if_law((LAW_STIFFNESS,), _as_it_ends)
 def correct_spring_depth(n, y, end, h, offset_frame, report, work):
-    """The end of a stage from y with no point deeper than its spring is due to be, and no other one in a wall.
+    """End of a stage from y with no point deeper than its spring's due depth, and no other point in a wall.
 
-    Nor is more stored in the springs than there was, and than the motion has lost and the loads have done on the way.
-    (Damping stops a point that turns as it does at the start of the stage: what turns less by then it leaves deeper.)
-    Friction far beyond 1 may push a point that turns more than its spring takes: that is taken from the motion.
+    The springs store at most the sum of the energy before, of the loss of motion and of the work of the loads. (Damping
+    stops a point at the turning rate of the stage's start, and leaves a point deeper whose body turns more slowly
+    later.) Friction far beyond 1 may push a turning point by more than its spring takes; this energy is taken from the
+    motion.
     """
     x, q, v, L = end
     R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * work.slop
@@ -221,7 +222,7 @@ def _as_it_is(block, work):
 
 @if_law((LAW_STIFFNESS,), _as_it_is)
 def add_block_compliance(W, work):
-    """The block of a contact with itself, and γ."""
+    """Block of a contact with itself, and γ."""
     return W[0] + work.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
 
 
@@ -242,5 +243,5 @@ def _unyielding(value, rho, work):
 
 @if_law((LAW_STIFFNESS,), _unyielding)
 def scale_by_compliance(value, rho, work):
-    """Scale a value, a normal impulse q - ρ u or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
+    """Scale a normal impulse q - ρ u, or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
     return value / (1.0 + rho * work.give)

@@ -1,4 +1,4 @@
-"""Impacts and stages that would gain energy: as much of the rebound, or of the impulses, as there is energy for.
+"""Limit the rebound of an impact, or the impulses of a stage, so that they create no energy.
 
 Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it
 can ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
@@ -6,8 +6,8 @@ can ask for more than the body has (Kane's paradox). A plastic impact never does
     ΔE = ½ p·(u⁻ + u⁺) = ½ (2 p·u⁺ - p·W p) <= 0.
 
 The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex,
-and leave no contact approaching. The energy is a parabola in s; the largest s at which it is what it was before is
-taken.
+and leave no contact approaching. The energy is a parabola in s. The kernel takes the largest s at which it equals the
+energy before.
 
 References
 ----------
@@ -32,7 +32,7 @@ _FREE_LIFT_SLOPS = 10.0
 
 @inlined
 def lift_conserving_energy(z, y, offset_frame, work):
-    """y at the place z out of a wall. The work of the lift against the loads is paid with motion, if there is any."""
+    """State y moved to the place z out of a wall. The work of the lift against the loads is taken from the motion."""
     x, q, v, L = y
     d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
     lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
@@ -61,7 +61,7 @@ def rebound_share(before, plastic, full, middle):
 
 @inlined
 def limit_rebound_energy(q, before, plastic, full, work, offset_frame):
-    """The (v, L) between those of a plastic impact and of a full rebound that there is energy for, and its share s.
+    """Motion (v, L) with the largest share s of the full rebound that creates no energy, and s.
 
     `before` is the energy before the impact [J], which the full rebound would raise.
     """
@@ -74,7 +74,7 @@ def limit_rebound_energy(q, before, plastic, full, work, offset_frame):
 
 @kernel
 def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, work):
-    """Result of `solve_contacts` for `free` (v, L), with impulses so short that they give no energy.
+    """Result of `solve_contacts` for `free` (v, L), with impulses shortened until they create no energy.
 
     For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
     ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before

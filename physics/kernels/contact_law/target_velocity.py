@@ -1,4 +1,4 @@
-"""Target velocities of the contacts of a set: at an impact, and at the end of a stage that they rest through."""
+"""Target velocities of the contacts of a set: at an impact, and at the end of a resting stage."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ class TargetLimits(NamedTuple):
 
 @inlined
 def may_have_impact(bounce_speed, slop_speed, work):
-    """True if a contact of the set is fast enough for an impact: where none is, none is looked at."""
+    """True if a contact of the set is fast enough for an impact; else no impact is looked for."""
     return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
 
 
 @inlined
 def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, work):
-    """Targets of an impact, and what there is: nothing, contacts to bring back to rest, or an impact.
+    """Set the targets of an impact; return its kind: nothing, contacts to bring to rest, or an impact.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
     approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
@@ -60,8 +60,8 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, 
     the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
     frictionless impact of several contacts gains energy (Moreau; theory, section 8).
 
-    A contact that goes on from the last stage has hit nothing (`persistent_contacts`): it is brought to rest, and its
-    speed set to zero, but that is no impact.
+    A contact that continues from the last stage has hit nothing (`persistent_contacts`). It is brought to rest, and its
+    speed set to zero, without an impact.
     """
     found, rate = NO_IMPACT, 1.0 / h
     for i in range(n):
@@ -96,7 +96,7 @@ def is_above_wall(i, n, work):
 
 @inlined
 def clamp_target_to_energy(target, u):
-    """A target for the velocity of a contact (normal, tangents), at most what turns its velocity u round.
+    """Limit a target (normal, tangents) for a contact of the velocity u to at most a reversal of u.
 
     Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
     nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage the target
@@ -111,7 +111,7 @@ def clamp_target_to_energy(target, u):
 
 @inlined
 def _in_frame(k, a, walls):
-    """A vector in the frame of wall k: normal, tangents."""
+    """Vector in the frame of wall k: normal, tangents."""
     return (
         a[0] * walls[k, 0] + a[1] * walls[k, 1] + a[2] * walls[k, 2],
         a[0] * walls[k, 3] + a[1] * walls[k, 4] + a[2] * walls[k, 5],
@@ -121,7 +121,7 @@ def _in_frame(k, a, walls):
 
 @kernel
 def _wandering(k, R, w, offset_frame, work):
-    """`contact_arm_and_rate` of a body without vertices at wall k: apart, so that blocks do not carry it along."""
+    """`contact_arm_and_rate` of a body without vertices at wall k, apart from the code of blocks."""
     dims = (work.dims[0], work.dims[1], work.dims[2])
     return contact_arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, offset_frame, work)
 
@@ -140,7 +140,7 @@ def _wandering_point(k, R, w, alpha, offset_frame, work):
 
 @inlined
 def _aim_at_wall(first, n, motion, limits, offset_frame, work):
-    """`set_resting_targets` for contacts from `first` on, up to four of one wall: the next one after them."""
+    """Do `set_resting_targets` for contacts from `first` on, up to four of one wall; return the next contact."""
     walls, arm = work.walls, work.arm
     R, v, w, alpha = motion
     half, is_turning, negligible, rate = limits
@@ -171,21 +171,21 @@ def _aim_at_wall(first, n, motion, limits, offset_frame, work):
 
 @kernel
 def _aim_at_others(first, n, motion, limits, offset_frame, work):
-    """`set_resting_targets` for contacts from `first` on: apart, since most bodies touch one wall."""
+    """Do `set_resting_targets` for contacts from `first` on; seldom called, since most bodies touch one wall."""
     while first < n:
         first = _aim_at_wall(first, n, motion, limits, offset_frame, work)
 
 
 @inlined
 def set_resting_targets(n, motion, h, offset_frame, work):
-    """Targets of the resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
+    """Set the targets of a resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
     point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
-    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall
-    may close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). What is smaller than the tolerance
-    of the solve, or would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body comes to
-    rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
+    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall may
+    close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). A target smaller than the tolerance of
+    the solve, or one that would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body
+    comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
     w = motion.w
     is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and work.shape != SPHERE

@@ -53,7 +53,7 @@ class PairProblem(NamedTuple):
 
 
 class PairTrial(NamedTuple):
-    """Impulses that were tried for two contacts, and where to go on from.
+    """Trial impulses of two contacts, and the state from which the search continues.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Contact with friction as one linear complementarity problem: the fallback that pivots.
+"""Contact with friction as one linear complementarity problem: the pivoting fallback.
 
 n contacts with impulses p = (normal, tangent 1, tangent 2) each [N s] and
 velocities u = W p + b [m/s]. Coulomb's cone |p_t| <= mu p_n is replaced by the
@@ -180,7 +180,7 @@ def fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q):
 
 @kernel
 def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
-    """p from the multipliers, pulled back into the cone by what rounding put outside."""
+    """Store the impulses of the multipliers, moved back into the cone where rounding put them outside."""
     for i in range(n):
         row = UNKNOWNS_PER_CONTACT * i
         x, y = 0.0, 0.0
@@ -198,7 +198,7 @@ def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
 
 @inlined
 def _pyramid_problem(n, work):
-    """The `PyramidProblem` in `work`, whose contents are not set."""
+    """Make the `PyramidProblem` in `work`, whose contents are not set."""
     size = UNKNOWNS_PER_CONTACT * n
     rows, columns = size + 3, size + 2
     end_M = size * size
@@ -226,7 +226,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     mu : (n or more,) float64
         Coefficients of friction, >= 0.
     n : int
-        How many contacts.
+        Number of contacts.
     p : (3 n or more,) float64, in and out
         [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
         the solution if the status is `LCP_SOLVED`, else unchanged.
@@ -281,7 +281,7 @@ def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
     b : (n or more,) float64
         [m/s]. Free normal velocities, bias included.
     n : int
-        How many contacts.
+        Number of contacts.
     p : (n or more,) float64, out
         [N s]. The solution if the status is `LCP_SOLVED`, else unchanged.
     work, index : float64, int64, work

@@ -110,7 +110,7 @@ def invert_contact_blocks(n, work):
 
 @kernel
 def update_contact_velocities(rows, W, p, b, u):
-    """u = W p + b over the leading `rows`."""
+    """Update u = W p + b in the first `rows` rows."""
     for r in range(rows):
         total = b[r]
         for s in range(rows):
@@ -120,7 +120,7 @@ def update_contact_velocities(rows, W, p, b, u):
 
 @kernel
 def cone_residual(n, p, u, mu, local):
-    """Largest natural-map residual over the contacts [m/s]; see the module docstring. Infinite if u is no number."""
+    """Largest natural-map residual over the contacts [m/s] (see the module docstring); infinite if u is NaN."""
     worst = check = 0.0
     for i in range(n):
         r = 3 * i
@@ -168,7 +168,7 @@ def normal_sweeps(n, tolerance, limit, work):
 
 @inlined
 def _solve_sliding_contact(r, bn, bx, by, p1, p2, mu, W):
-    """Impulse of one sliding contact that alone answers its free velocity b, and whether one was found.
+    """Impulse of one sliding contact that answers its free velocity b alone, and whether one was found.
 
     With p = p_n (1, -μ d), p_n = -b_n / (W_nn - μ W_nt·d): the contact neither approaches nor leaves. What is
     left is the angle of d for which the velocity across, g = e·u_t with e = n x d, vanishes: Newton's method
@@ -208,7 +208,7 @@ def _solve_sliding_contact(r, bn, bx, by, p1, p2, mu, W):
 
 @kernel
 def _local_impulse(i, impulse, u, mu, W, local):
-    """Impulse of contact i that answers its own velocity, all others held: (normal, tangent 1, tangent 2)."""
+    """Impulse of contact i that answers its own velocity, with all others unchanged: (normal, tangent 1, tangent 2)."""
     r = 3 * i
     p0, p1, p2 = impulse[r], impulse[r + 1], impulse[r + 2]
     # Release: with no impulse of its own the contact already separates.
@@ -242,7 +242,7 @@ def _local_impulse(i, impulse, u, mu, W, local):
 
 @inlined
 def _extrapolate(n, mu, ratio, work):
-    """p plus the rest of the geometric series of its changes, back in the cones; and u = W p + b."""
+    """Add the rest of the geometric series of its changes to p, project it into the cones, and update u = W p + b."""
     p, change = work.impulse, work.change
     s = ratio / (1.0 - ratio)
     for i in range(n):

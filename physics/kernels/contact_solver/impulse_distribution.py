@@ -1,4 +1,4 @@
-"""Sharing out a total impulse and its moment among contacts that hold; see `sticking`."""
+"""Distribute a total impulse and its moment among sticking contacts; see `sticking`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def solve_symmetric(k, b):
 
 @inlined
 def first_active(n, work):
-    """First contact that is not left out."""
+    """Index of the first active contact."""
     for i in range(n):
         if work.active[i] != 0:
             return i
@@ -51,7 +51,7 @@ def is_in_cone(pn, pa, pb, work):
 
 @inlined
 def distribute_by_bolt_group(n, count, c, F, a, work):
-    """Bolt-group impulses: (the contact that pulls most or -1, whether all are in their cones)."""
+    """Bolt-group impulses: (contact that pulls most or -1, whether all are in their cones)."""
     walls = work.walls
     lowest = 0.0
     loser = -1
@@ -87,7 +87,7 @@ def _coordinates_along(axis, n, work):
 
 @inlined
 def distribute_by_load(n, work):
-    """Share the tangential impulses of one wall out in proportion to the normal ones; whether that holds.
+    """Distribute the tangential impulses of one wall like the normal ones; return whether all stay in their cones.
 
     With weights g_i, at first the normal impulses, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i u_i, where
 

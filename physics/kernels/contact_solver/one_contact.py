@@ -123,19 +123,19 @@ def diagonal_delassus_block(r, inv_mass, ratio, K):
 
 @inlined
 def inverse_root(square):
-    """1/√ of a number or of lanes, root and quotient side by side: what waits for it waits for the longer of them."""
+    """1/√x of a number or of lanes; root and quotient are computed side by side, to shorten the wait for the result."""
     return lane_sqrt(square) * (1.0 / square)
 
 
 @inlined
 def is_warm_start_valid(push, needed):
-    """True if a warm start's push is so near to the push that the present loads need that its friction is, too."""
+    """True if a warm start's push is so close to the push under the present loads that its friction is valid, too."""
     return abs(push - needed) <= _WARM_START_TOLERANCE * abs(needed)
 
 
 @inlined
 def friction_direction(x, y, mu):
-    """-μ times the direction of (x, y); 0 when that has no direction."""
+    """Vector -μ times the direction of (x, y); 0 if (x, y) has no direction."""
     square = x * x + y * y
     if not square > MIN_SQUARED_NORM:
         return 0.0, 0.0
@@ -145,7 +145,7 @@ def friction_direction(x, y, mu):
 
 @inlined
 def rotate_direction(x, y, angle):
-    """The vector (x, y) turned by about `angle`, its length kept."""
+    """Vector (x, y) turned by about `angle`, with its length kept."""
     t = min(_MAX_ANGLE_STEP, max(-_MAX_ANGLE_STEP, angle))
     s = inverse_root(1.0 + t * t)
     return s * (x - t * y), s * (y + t * x)
@@ -163,7 +163,7 @@ def sliding_residual(across, along, weight):
 
 @inlined
 def solve_contact_block(W, b, mu, trace, goal, x, y, may_hold):
-    """Impulse of one contact that alone answers its free velocity b.
+    """Impulse of one contact that answers its free velocity b alone.
 
     Parameters
     ----------

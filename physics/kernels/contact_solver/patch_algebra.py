@@ -58,9 +58,9 @@ def patch_centroid(count, patch, on):
 
 @inlined
 def fit_normal_motion(count, patch, on):
-    """The normal motion that fits the targets of the active contacts best: (is one, centroid, (v_n, ω_a, ω_b)).
+    """Normal motion that best fits the active contacts' targets: (whether one exists, centroid, (v_n, ω_a, ω_b)).
 
-    Of contacts on a line it is not finite, or no longer accurate: then there is none.
+    Contacts on a line give a motion that is not finite, or inaccurate; then there is none.
     """
     _, a, b = patch.points
     target = patch.targets[0]
@@ -81,7 +81,7 @@ def fit_normal_motion(count, patch, on):
 
 @inlined
 def normal_velocity_excess(patch, vn, wa, wb):
-    """Normal velocities of the contacts less their targets [m/s] in a normal motion; of an open one it may be > 0."""
+    """Normal velocities of the contacts minus their targets [m/s] in a normal motion; an open contact may exceed 0."""
     _, a, b = patch.points
     return (vn + wa * b - wb * a) - patch.targets[0]
 
@@ -96,7 +96,7 @@ def normal_motion_about(count, center, motion, body):
 
 @inlined
 def patch_friction_directions(ua, ub, on, mu):
-    """The `PatchFriction` of contacts that slide, against a slip (ua, ub) [m/s]: none where one is open or still."""
+    """`PatchFriction` of contacts that slide against a slip (ua, ub) [m/s]; zero for contacts open or at rest."""
     square = ua * ua + ub * ub
     s = select_lanes(square > MIN_SQUARED_NORM, -mu * on * inverse_root(square), 0.0)
     return PatchFriction(s * ua, s * ub, lane_sqrt(square))
@@ -202,7 +202,7 @@ def patch_normal_impulses(patch, on, normal, y, friction):
 
 @inlined
 def planar_motion_after(exerted, body, work):
-    """Planar motion that impulses along the tangents, and moments, lead to."""
+    """Planar motion after impulses along the tangents, and moments."""
     fa, fb, tn, ta, tb = exerted
     u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
     mass_b = ratio * ratio * inv_mass
@@ -211,10 +211,10 @@ def planar_motion_after(exerted, body, work):
 
 @inlined
 def patch_sliding_residual(patch, p, friction, mu, delta):
-    """Largest tangential residual [m/s] when the motion that the directions are of is left by delta: if all slide.
+    """Largest tangential residual [m/s] if all slide, when the motion changes by delta but the directions stay.
 
-    Of the contacts with a push p > 0. Of one that moves backwards the whole velocity counts: its impulse is in the
-    cone, and projections do not lengthen.
+    Only contacts with a push p > 0 count. A contact that moves backwards counts with its whole velocity: its impulse is
+    in the cone, and projections do not lengthen.
 
     Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
     """
@@ -243,14 +243,14 @@ def patch_sliding_residual(patch, p, friction, mu, delta):
 
 @inlined
 def has_turned_far(on, d, size, change):
-    """Mark the slips, of direction d and this size [m/s], that turn by more than about 70 degrees when they change."""
+    """Mark slips, of direction d and this size [m/s], that turn by more than about 70 degrees by a change."""
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
 def has_small_turns(patch, on, friction, mu, step):
-    """True if no direction turns by more than about 70 degrees, and none backwards, in a step of the motion."""
+    """True if, in a step of the motion, no direction turns by more than about 70 degrees, and none backwards."""
     _, a, b = patch.points
     x, y, size = friction
     s = -1.0 / mu

@@ -1,4 +1,4 @@
-"""Start of a patch's solve: from the impulses of the last stage, or, where they are of other loads, from a guess."""
+"""Start of a patch's solve: the impulses of the last stage, or a guess where they belong to other loads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MIN_SLIP_SHARE = 0.01
 
 @inlined
 def warm_start_motion(n, patch, on, body, work):
-    """Planar motion after the impulses in `work`, those of the warm start, and whether they are of these loads."""
+    """Planar motion after the warm-start impulses in `work`, and whether these belong to the present loads."""
     c, a, b = patch.points
     u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
     p, x = on * gather_component(work.impulse, 0, n), on * gather_component(work.impulse, 1, n)
@@ -38,7 +38,7 @@ def warm_start_friction(n, patch, on, work):
 
 @inlined
 def _centroid_and_variance(n, a, b, on):
-    """Centroid of the contacts along the tangents, and mean square of their distance from it."""
+    """Centroid of the contacts along the tangents, and mean square of their distances from it."""
     share = 1.0 / n
     ca, cb = share * lane_sum(on * a), share * lane_sum(on * b)
     a, b = on * (a - ca), on * (b - cb)
@@ -47,11 +47,11 @@ def _centroid_and_variance(n, a, b, on):
 
 @inlined
 def may_stick(n, axes, v, L, work):
-    """True if friction may stop a face, with the velocity v and angular momentum L that it has without it.
+    """True if friction may stop a face with the velocity v and angular momentum L before friction.
 
-    What holds stops at its wall: the pushes P take away the normal momentum, and friction, μP at most, the tangential
-    one; its moment about the centroid is μ Σ p_i |d_i| <= μP max |d_i| at most. Of a face that can hold this is true;
-    one that slips within the tolerance of a solve would be taken for it, and creep.
+    A sticking face stops at its wall. The pushes P remove the normal momentum, and friction, at most μP, the tangential
+    one. Its moment about the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. So the result is True for every face
+    that can stick. A face that slips within the tolerance of a solve would be taken for sticking, and creep.
     """
     ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
     va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
@@ -67,7 +67,7 @@ def may_stick(n, axes, v, L, work):
 
 @inlined
 def cold_start_motion(n, patch, on, mu, body):
-    """Planar motion that friction leaves of one without impulses, if the planar friction is that of an ellipsoid.
+    """Planar motion after friction, if planar friction is that of an ellipsoid, from the motion without impulses.
 
     The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
     ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
@@ -75,8 +75,8 @@ def cold_start_motion(n, patch, on, mu, body):
 
         v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
 
-    1/φ is nearly a straight line and concave: one step of Newton's, from where it is not above 1, is near enough. What
-    φ(0) <= 1 says would hold is given a small part of its slip, since directions are wanted.
+    1/φ is nearly a straight line and concave. One Newton step from a point where it is at most 1 is accurate enough. A
+    face with φ(0) <= 1 would stick; it keeps a small part of its slip, since directions are needed.
     """
     _, a, b = patch.points
     u, w, inv_mass = body.u, body.w, body.inv_mass

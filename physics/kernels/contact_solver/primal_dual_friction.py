@@ -1,4 +1,4 @@
-"""Friction of a patch whose directions would turn right round: impulses anywhere in the disc, primal-dual Newton.
+"""Friction of a patch whose sliding directions would reverse: impulses anywhere in the disc, primal-dual Newton.
 
 Of a contact that stops, or nearly stops, a direction says nothing. So its friction -μ p z, |z| <= 1, is sought beside
 the planar motion τ: z |u| = u, so that what slides has z = d, and what holds has u = 0 and any z in the disc.
@@ -92,7 +92,7 @@ class PatchRound(NamedTuple):
 
 
 class SlipLimits(NamedTuple):
-    """Slips that are too small for a direction.
+    """Slips below which a direction is undefined.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class SlipLimits(NamedTuple):
 
 @inlined
 def solve_planar_step(compliance, h, r):
-    """Step Δ of (1 + C H) Δ = r, H row by row (9), by the columns of the matrix and Cramer's rule."""
+    """Solve (1 + C H) Δ = r for the step Δ, with H row by row (9), by Cramer's rule."""
     c0, c1, c2, c3, c4, c5, c6, c7, c8 = compliance
     h00, h01, h02, h10, h11, h12, h20, h21, h22 = h
     x = (
@@ -133,7 +133,7 @@ def solve_planar_step(compliance, h, r):
 
 @inlined
 def _friction_residual(mobility, p, friction, mu, after):
-    """Largest tangential residual [m/s] of pushes p and their `PatchFriction`, when contacts slip as `after`.
+    """Largest tangential residual [m/s] of pushes p and their `PatchFriction` for the slips `after`.
 
     The natural map of Coulomb's disc, |f - P(f - u/W)| W of the impulse f with W = W_aa + W_bb, which is at least 1/ρ
     of its own (`gauss_seidel`); P projects onto the disc |f| <= μ p.
@@ -178,7 +178,7 @@ def _newton_step(patch, load, d, size, gain, taken, compliance, delta):
 
 @inlined
 def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
-    """z' of the next round; of what slides, and where it is out of the disc, u'/|u'|, or cut short where that turns."""
+    """Friction z' of the next round; u'/|u'| for sliding contacts and outside the disc, shortened if it reverses."""
     s = d[0] * change[0] + d[1] * change[1]
     za = z[0] + (gain[0] + (change[0] - taken[0] * s) / size)
     zb = z[1] + (gain[1] + (change[1] - taken[1] * s) / size)
@@ -191,7 +191,7 @@ def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
 
 @kernel
 def take_viscous_step(problem, on, p, friction, compliance, delta):
-    """First step, from where all slide, with A = 1: (step of the planar motion, impulses per normal impulse)."""
+    """First step, from all contacts sliding, with A = 1: (step of the planar motion, impulses per normal impulse)."""
     patch, mu, goal = problem.patch, problem.mu, problem.goal
     size, s = larger(friction.speed, _NO_DIRECTION_SHARE * goal), -1.0 / mu
     d, none = (s * friction.x, s * friction.y), Lanes(0.0, 0.0, 0.0, 0.0)
@@ -235,7 +235,7 @@ def _primal_dual_step(problem, on, p, friction, u, compliance, delta, limits):
 
 @kernel
 def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, work):
-    """Impulses with which some of the contacts hold, and the other active ones slide.
+    """Impulses of a patch in which some contacts stick, and the other active ones slide.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Contact problems on which sweeps crawl: Newton's method on the twist, inside a proximal-point iteration.
+"""Newton's method on the twist, inside a proximal-point iteration, for contact problems on which sweeps crawl.
 
 On the verge of sliding (all contacts nearly hold, or creep, or one holds while others slide) sweeps converge
 as slowly as one likes, and four contacts of a face leave the impulses undetermined. The change x of the
@@ -53,7 +53,7 @@ _ROUND_TOLERANCE_SHARE = 0.01
 
 @inlined
 def _fixed_point_residual(n, factor, inv_mass, work):
-    """x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; its size as a velocity [m/s].
+    """Write x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; return the defect's size as a velocity [m/s].
 
     `work.velocity` receives q - ρ u, which the derivative of the law is taken at.
     """
@@ -90,7 +90,7 @@ def _jacobian_entry(s, c, work):
 
 @inlined
 def _fill_newton_matrix(n, factor, inv_mass, work):
-    """Newton matrix 1 - M⁻¹ Jᵀ p'(u) J after `_fixed_point_residual`, and -defect beside it (6 x 7)."""
+    """Fill the Newton matrix 1 - M⁻¹ Jᵀ p'(u) J after `_fixed_point_residual`, with -defect beside it (6 x 7)."""
     A, y, frame, response = work.newton, work.velocity, work.frame, work.response
     for a in range(6):
         for b in range(6):
@@ -124,7 +124,7 @@ def _fill_newton_matrix(n, factor, inv_mass, work):
 
 @inlined
 def _eliminate(A):
-    """Solve the 6 x 6 system with its right side in column 6 by elimination; the result in column 6."""
+    """Solve the 6 x 6 system with its right side in column 6 by elimination; the result is in column 6."""
     for k in range(6):
         best = k
         for a in range(k + 1, 6):
@@ -146,7 +146,7 @@ def _eliminate(A):
 
 @inlined
 def _newton_step(n, size, factor, inv_mass, work):
-    """One damped Newton step on the twist; the new size of the defect."""
+    """Take one damped Newton step on the twist; return the new size of the defect."""
     x, start, step = work.twist, work.start, work.newton
     _fill_newton_matrix(n, factor, inv_mass, work)
     _eliminate(work.newton)
@@ -166,7 +166,7 @@ def _newton_step(n, size, factor, inv_mass, work):
 
 @inlined
 def _twist_of_impulses(n, inv_mass, work):
-    """x = M⁻¹ Jᵀ p of `work.impulse`."""
+    """Twist x = M⁻¹ Jᵀ p of `work.impulse`."""
     x, p = work.twist, work.impulse
     for c in range(6):
         x[c] = 0.0

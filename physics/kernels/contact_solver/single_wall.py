@@ -1,4 +1,4 @@
-"""The contacts of one wall, up to four, solved directly: one or two (`two_contacts`), or a face (`sliding_patch`)."""
+"""Solve the contacts of one wall, up to four, directly: one or two (`two_contacts`), or a face (`sliding_patch`)."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class WallSolution(NamedTuple):
 
 @inlined
 def _solve_face(n, friction, body, work):
-    """Three contacts or four; `work.impulse` when found."""
+    """Solve three or four contacts; write `work.impulse` if a solution is found."""
     patch, on = gather_patch(n, body, work), valid_lanes_mask(n)
     scale = largest_free_speed(friction, patch, body)
     start, is_mixed = (body.u[1], body.u[2], body.w[0]), False
@@ -72,7 +72,7 @@ def _solve_face(n, friction, body, work):
 
 @inlined
 def _store_impulse(i, p, friction, work):
-    """Impulse of contact i to `work.impulse`, along the unit tangents."""
+    """Write the impulse of contact i to `work.impulse`, along the unit tangents."""
     if friction is None:
         work.impulse[i] = p[0]
     else:
@@ -90,7 +90,7 @@ def _largest_component(friction, b):
 
 @inlined
 def _solve_one_or_two(n, friction, body, work):
-    """One contact or two, as `_solve_face`."""
+    """Solve one or two contacts, like `_solve_face`."""
     first = contact_in_wall_frame(0, body, work)
     scale = _largest_component(friction, first.approach)
     if n == 1:
@@ -111,7 +111,7 @@ def _solve_one_or_two(n, friction, body, work):
 
 @inlined
 def solve_single_wall(n, friction, wall, R, v, L, work):
-    """Try the impulses with which the n contacts of one wall slide, open, or turn about one that holds.
+    """Try the impulses with which the n contacts of one wall slide, open, or turn about a sticking one.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ class PushingContacts(NamedTuple):
     Attributes
     ----------
     count : int
-        How many.
+        Number of them.
     on : lanes
         1 for each of them, 0 for an open contact.
     is_back : lanes
@@ -125,7 +125,7 @@ class PushingContacts(NamedTuple):
 
 
 class NormalChoice(NamedTuple):
-    """Normal motion that was chosen for the contacts that push.
+    """Normal motion chosen for the contacts that push.
 
     Attributes
     ----------
@@ -148,10 +148,10 @@ class NormalChoice(NamedTuple):
 
 @inlined
 def _fit_pushing_contacts(pushing, problem):
-    """Choose the normal motion of the contacts that push, and which do.
+    """Choose the contacts that push, and their normal motion.
 
-    Targets of four contacts that are those of no rigid motion are met by three: one opens that is then faster than its
-    target. Of the two of a rectangle it is the one that approaches less.
+    Four targets may belong to no rigid motion. Then three contacts meet their targets, and one opens that is then
+    faster than its target. A rectangle has two such choices; the contact that approaches less opens.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def _fit_pushing_contacts(pushing, problem):
 
 @inlined
 def _choose_normal_motion(pushing, choice, problem):
-    """As `_fit_pushing_contacts`; a choice that is even stays, about the centroid of the contacts that now push."""
+    """Choose the normal motion as `_fit_pushing_contacts`; an even choice stays, about the new centroid."""
     if choice.is_even:
         return pushing, patch_centroid(pushing.count, problem.patch, pushing.on), choice
     return _fit_pushing_contacts(pushing, problem)
@@ -186,7 +186,7 @@ def _choose_normal_motion(pushing, choice, problem):
 
 @inlined
 def _solve_remaining_pair(on, problem, work):
-    """The two contacts that still push, the others open.
+    """Solve the two contacts that still push, with the others open.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def _solve_remaining_pair(on, problem, work):
 
 @inlined
 def _direction_newton_round(patient, pushing, problem, normal, motion, work):
-    """One round of Newton's method on the directions, those of `motion`.
+    """Take one round of Newton's method on the directions of `motion`.
 
     Returns
     -------
@@ -258,7 +258,7 @@ def _direction_newton_round(patient, pushing, problem, normal, motion, work):
 
 @inlined
 def _push_again(contact, pushing):
-    """Have an open contact push once more."""
+    """Let an open contact push once more."""
     is_it = select_lane(contact)
     return PushingContacts(
         pushing.count + 1, select_lanes(is_it, 1.0, pushing.on), select_lanes(is_it, 1.0, pushing.is_back)
@@ -267,7 +267,7 @@ def _push_again(contact, pushing):
 
 @inlined
 def _open_pulling(current, pulling, pushing):
-    """Open the contact that would pull most, or both where a face tips."""
+    """Open the contact that would pull most, or two contacts of a tipping face."""
     count, on, is_back = pushing
     if current.what == ROUND_TIPS:
         return PushingContacts(2, on - pulling, is_back)
@@ -276,7 +276,7 @@ def _open_pulling(current, pulling, pushing):
 
 @inlined
 def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
-    """One round on the directions, and where they do not settle all rounds of `primal_dual_friction`.
+    """Take one round on the directions; where they do not settle, take all rounds of `primal_dual_friction`.
 
     Returns
     -------
@@ -301,7 +301,7 @@ def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
 
 @inlined
 def solve_sliding_patch(n, patient, problem, start, is_mixed, work):
-    """Directions and set of pushing contacts.
+    """Find the directions, and the contacts that push.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ MAX_PIVOTS = 500
 
 @if_given("contact.friction", 1)
 def rows_per_contact(contact):
-    """Unknowns of a contact: the normal impulse, with friction three."""
+    """Number of unknowns of a contact: the normal impulse, and with friction two more."""
     return 3
 
 
@@ -77,7 +77,7 @@ def _pivot(n, contact, work):
 
 @kernel
 def _solve_by_pivoting(n, contact, residual, work):
-    """Pivoting fallback; its result is kept where it beats that of the sweeps. Returns the residual [m/s]."""
+    """Solve by pivoting, and keep the result if it beats that of the sweeps. Returns the residual [m/s]."""
     rows = n * rows_per_contact(contact)
     for r in range(rows):
         work.saved[r] = work.impulse[r]
@@ -95,7 +95,7 @@ def _keep_sweeps(n, contact, limit, residual, work):
 
 @if_given("contact.pivots", _keep_sweeps)
 def _pivot_above(n, contact, limit, residual, work):
-    """Pivoting where sweeps left more than `limit` [m/s]: (residual, method)."""
+    """Solve by pivoting where sweeps left more than `limit` [m/s]: (residual, method)."""
     if residual <= limit:
         return residual, METHOD_SWEEPS
     return _solve_by_pivoting(n, contact, residual, work), METHOD_PIVOTING
@@ -126,18 +126,20 @@ def _apply_impulses(n, width, v, L, work):
 
 @kernel
 def _solve_sticking(n, R, v, L, work):
-    """`solve_all_sticking`, apart: it comes before or after the other attempt, and is compiled once."""
+    """Call `solve_all_sticking`, in a function of its own, since its place varies and it is compiled once."""
     return solve_all_sticking(n, R, v, L, work)
 
 
 @shared_kernel
 def _solve_directly(n, friction, R, v, L, work):
-    """Try that all contacts hold, and that they slide, the likelier one first: (found, v, L, residual).
+    """Try all contacts sticking, and all sliding, the likelier first: (found, v, L, residual).
 
-    `sliding_patch` knows all about a single contact. Whether an edge, or contacts of several walls, held last is tried
-    first. Of springs none hold, nor have they a normal motion known beforehand: `sliding_patch` for one or two.
+    `sliding_patch` solves any single contact. An edge, or contacts of several walls, begin with the attempt that
+    succeeded last. Springs never stick, nor is their normal motion known beforehand; one or two of them go to
+    `sliding_patch`.
 
-    Without a loop: LLVM would work out before it what only one of the attempts needs, whether that is made or not.
+    The attempts are written without a loop. LLVM would compute, before a loop, numbers that only one attempt needs,
+    whether that is made or not.
     """
     wall, is_soft = wall_of(work.slot[0], work), contact_stiffness(work) > 0.0
     is_one_wall = n <= LANE_COUNT and wall_of(work.slot[n - 1], work) == wall
@@ -162,7 +164,7 @@ def _solve_directly(n, friction, R, v, L, work):
 
 @inlined
 def _assemble_problem(n, width, R, v, L, work):
-    """Assemble the contact problem; largest free contact speed."""
+    """Assemble the contact problem; return the largest free contact speed."""
     J = work.J
     mb = qt.transposed_matvec(R, L)
     assemble_delassus(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), work)
@@ -180,7 +182,7 @@ def _sweep_normals(n, contact, goal, work):
 
 @if_given("contact.friction", _sweep_normals)
 def _sweep_and_newton(n, contact, goal, work):
-    """Sweeps in turn with Newton's method: (sweeps and steps, residual [m/s])."""
+    """Alternate sweeps with Newton's method: (sweeps and steps, residual [m/s])."""
     steps, residual = 0, 0.0
     invert_contact_blocks(n, work)
     for i in range(n):
@@ -206,7 +208,7 @@ def _sweep_and_newton(n, contact, goal, work):
 
 @shared_kernel
 def _solve_iteratively(n, contact, v, L, R, work):
-    """Result of `solve_contacts` by sweeps and later solvers: out of line, since few problems come to it."""
+    """Solve as `solve_contacts` by sweeps and later solvers; not inlined, since few problems come to it."""
     width = rows_per_contact(contact)
     scale = _assemble_problem(n, width, R, v, L, work)
     goal = max(min(work.tolerance * scale, work.residual_limit), _ROUNDING * scale)

@@ -1,4 +1,4 @@
-"""Contacts that all hold: the impulse of a patch, an edge or a point without a single sweep.
+"""Contacts that all stick: impulses of a patch, an edge or a point without a sweep.
 
 When every contact keeps the velocity asked of it (nothing slides, nothing lifts off) the twist after the
 solve is known before the impulses are, up to what the contacts do not fix:
@@ -73,12 +73,12 @@ class FreeMotion(NamedTuple):
 
 
 class BoltGroup(NamedTuple):
-    """Contacts that hold, flagged in `work.active`, world frame.
+    """Sticking contacts, flagged in `work.active`, world frame.
 
     Attributes
     ----------
     count : int
-        How many.
+        Number of them.
     center : tuple of 3 floats
         Their centroid r̄, from the centre of mass [m].
     second : tuple of 6 floats
@@ -224,7 +224,7 @@ def _point_impulse(r, t, free, work):
 
 @inlined
 def _sticking_twist(n, group, no_target, free, work):
-    """Velocity and angular velocity of the body when the active contacts take their targets."""
+    """Velocity and angular velocity of the body with the active contacts on their targets."""
     zero = (0.0, 0.0, 0.0)
     if no_target and not group.is_line:
         return zero, zero
@@ -257,10 +257,10 @@ def _solve_bolt_group(group, T):
 
 @inlined
 def _restore_moment(n, group, T, work):
-    """Restore the moment T of the impulses of `distribute_by_load`: True if they stay in their cones.
+    """Restore the moment T of the impulses of `distribute_by_load`; True if they stay in their cones.
 
-    It shares them out as if all contacts were equally deep in the wall, which is so to a few slops; the moment
-    that is missing for it makes one more bolt group, (K⁻¹ ΔT) x d_i.
+    `distribute_by_load` assumes that all contacts are equally deep in the wall, which holds to a few slops. The missing
+    moment ΔT makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
     walls, c = work.walls, group.center
     mx, my, mz = T
@@ -303,7 +303,7 @@ def _largest_free_speed(n, free, work):
 
 @inlined
 def solve_all_sticking(n, R, v, L, work):
-    """Try the impulses with which all n contacts take their target velocity.
+    """Try the impulses with which all n contacts move at their target velocities.
 
     Parameters
     ----------

@@ -4,9 +4,9 @@ Two contacts that slide are two angles. For given directions "both normal veloci
 2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
 across them (`one_contact` has the same for a single contact).
 
-A direction that would have to turn right round belongs to a contact that holds. Its impulse answers the other's,
-p_i = -W_ii⁻¹ (b_i + W_ij p_j), so that the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij.
-Where the cone does not allow p_i, contact i slides against it, and that is the next direction to start from.
+A direction that would turn right round belongs to a contact that sticks. Its impulse answers the other's, p_i = -W_ii⁻¹
+(b_i + W_ij p_j). So the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij. If the cone does not
+allow p_i, contact i slides against it, which gives the next direction to start from.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def _plus(p, q):
 
 @kernel
 def _solve_with_open(pair, direction):
-    """Try the first contact alone, which slides in a `direction` at first, the second one open."""
+    """Try the first contact alone, sliding in a `direction` at first, with the second one open."""
     Wi, bi, mu, goal = pair.W11, pair.b1, pair.mu, pair.goal
     x, y = direction
     what, p, miss = solve_contact_block(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
@@ -73,7 +73,7 @@ def _solve_with_open(pair, direction):
 
 @kernel
 def _solve_with_sticking(pair, direction):
-    """Try that the first contact holds, and the second one slides, in a `direction` at first, or opens."""
+    """Try the first contact sticking, and the second one sliding, in a `direction` at first, or open."""
     Wi, Wij, Wj, bi, bj, mu, goal = pair
     Wji = transpose_block(Wij)
     x, y = direction
@@ -104,7 +104,7 @@ def _solve_with_sticking(pair, direction):
 
 @inlined
 def _solve_both_sliding(pair, first, second):
-    """The `SlidingPair` of two directions."""
+    """Make the `SlidingPair` of two directions."""
     W11, W12, W22, b1, b2, mu, _ = pair
     (x1, y1), (x2, y2) = first, second
     a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
@@ -157,10 +157,10 @@ def _direction_newton_step(pair, first, second, sliding):
 
 @kernel
 def _solve_alternately(pair, trial):
-    """Each contact answers the impulse of the other in turn, from a trial on; then what it came to is tried.
+    """Let each contact answer the other's impulse in turn, starting from a trial; then try the result.
 
-    One of them was to hold or to open and does not, or turns right round: Newton's method would go on to where friction
-    pushes it along.
+    This is called when a contact that was assumed to stick or open does not, or would turn right round. Newton's method
+    would then go on to a state in which friction pushes the contact along.
     """
     W11, W12, W22, b1, b2, mu, goal = pair
     _, p, q, miss, (x1, y1), (x2, y2) = trial
@@ -184,7 +184,7 @@ def _solve_alternately(pair, trial):
 
 @inlined
 def _turn_directions(pair, trial, sliding):
-    """The trial with both directions turned by Newton's step."""
+    """Trial with both directions turned by Newton's step."""
     (x1, y1), (x2, y2) = trial.first, trial.second
     turn1, turn2 = _direction_newton_step(pair, trial.first, trial.second, sliding)
     first, second = rotate_direction(x1, y1, turn1), rotate_direction(x2, y2, turn2)
@@ -193,7 +193,7 @@ def _turn_directions(pair, trial, sliding):
 
 @inlined
 def _try_sliding(sliding, first, second, goal):
-    """The trial of two contacts that slide."""
+    """Trial of two sliding contacts."""
     p1, p2, (x1, y1), (x2, y2) = sliding.p1, sliding.p2, first, second
     worst = max(sliding.miss1, sliding.miss2)
     found = p1 >= 0.0 and p2 >= 0.0 and worst <= goal
@@ -202,7 +202,7 @@ def _try_sliding(sliding, first, second, goal):
 
 @inlined
 def solve_block_pair(pair, first, second):
-    """The `PairTrial` that solves a `PairProblem`, from these directions (-μ d) on."""
+    """Solve a `PairProblem` from given directions (-μ d): its `PairTrial`."""
     swapped = swap_pair_problem(pair)
     held1 = held2 = opened = turns = 0
     for _ in range(_MAX_NEWTON_STEPS):
@@ -271,7 +271,7 @@ def _frictionless_response(pair):
 
 @inlined
 def solve_two_contacts(first, second, mu, goal, body, work):
-    """Impulses of two contacts.
+    """Solve two contacts: their impulses.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The contact problem of a moment for the impact's solver, and what its solution says that the contacts do."""
+"""Contact problem of accelerations at one moment, for the impact's solver, and the contact mode of its solution."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _PAINLEVE_PUSH = 0.03
 
 @inlined
 def set_up_contact(i, slot, r, target, work):
-    """Contact i of a problem for `contact_solver.solve.solve_contacts`, without a warm start."""
+    """Set up contact i of a problem for `contact_solver.solve.solve_contacts`, without a warm start."""
     work.slot[i] = slot
     work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
     work.target[i, 0], work.target[i, 1], work.target[i, 2] = target
@@ -51,11 +51,11 @@ def set_up_contact(i, slot, r, target, work):
 
 @kernel
 def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, candidates):
-    """Write the contact problem of candidates that do not slide into `work`: (acceleration, moment) without forces.
+    """Write the contact problem of candidates that do not slide into `work`; return the free (acceleration, moment).
 
-    It is that of an impact with the free acceleration for velocity, the moment τ - ω x L for angular momentum and
-    forces for impulses; what an arm's own motion adds to a contact's acceleration is asked of it as a target.
-    `has_sliding`: some of the candidates slide (`candidate_direction`).
+    The problem is that of an impact, with the free acceleration for the velocity, the moment τ - ω x L for the angular
+    momentum, and forces for impulses. The motion of an arm adds to a contact's acceleration, which is made part of its
+    target. `has_sliding`: some of the candidates slide (`candidate_direction`).
     """
     walls = work.walls
     scale = acceleration_scale(w, work)
@@ -82,7 +82,7 @@ def has_sliding_direction(way, i):
 
 @inlined
 def is_redundant_contact(i, count, width, small, work):
-    """True if contact i without a force may be left to the others of its wall: at least three push."""
+    """True if contact i without a force may be left to the others of its wall, of which three push at least."""
     wall, pushing = wall_of(work.slot[i], work), 0
     for j in range(count):
         if wall_of(work.slot[j], work) == wall and work.impulse[width * j] > small * work.mass:
@@ -92,7 +92,7 @@ def is_redundant_contact(i, count, width, small, work):
 
 @inlined
 def store_solver_forces(count, width, work, contacts):
-    """`last_force`: the solver's forces."""
+    """Store the solver's forces in `last_force`."""
     clear_last_forces(contacts)
     for i in range(count):
         for c in range(width):
@@ -101,7 +101,7 @@ def store_solver_forces(count, width, work, contacts):
 
 @kernel
 def is_body_at_rest(y, w, acceleration, work, thresholds):
-    """True if the body neither moves nor begins to: what is left is rounding."""
+    """True if the body neither moves nor begins to, except for rounding."""
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
     return speed <= 2.0 * thresholds.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
@@ -109,7 +109,7 @@ def is_body_at_rest(y, w, acceleration, work, thresholds):
 
 @kernel
 def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, work, motion):
-    """Read the contact mode from the solution of `set_up_resting_problem`'s problem, and set the contacts that act."""
+    """Set the contact mode and the acting contacts from the solution of `set_up_resting_problem`'s problem."""
     candidates = motion.candidates
     R, P, w, _ = free_angular_motion(y, offset_frame, work)
     alpha = apply_inverse_inertia(P, work.J, moment)

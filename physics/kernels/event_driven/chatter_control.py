@@ -1,4 +1,4 @@
-"""Look-ahead of a contact mode, and small leaps of first order where events crowd."""
+"""Limit of crowded events: the look-ahead of a contact mode, and small leaps of first order."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _EVENTS_BETWEEN_LEAPS = 6
 
 @inlined
 def reset_chatter_control(unit, pace):
-    """Look-ahead and leaps at the start of a part, for a body whose own time is `unit` [s]; no event so far."""
+    """Reset look-ahead and leaps at the start of a part, for a body with the time scale `unit` [s]."""
     pace.look_ahead = pace.min_look_ahead = _LOOK_AHEAD * unit
     pace.next_leap = _FIRST_LEAP * pace.min_look_ahead
     pace.chatter_start, pace.chatter_count = 0.0, 0
@@ -33,7 +33,7 @@ def reset_chatter_control(unit, pace):
 
 @inlined
 def is_chattering(t, pace):
-    """Count an event at the time t of the part; whether there have been too many within one look-ahead."""
+    """Count an event at the time t of the part; return whether one look-ahead has had too many."""
     pace.chatter_count += 1
     if t > pace.chatter_start + pace.min_look_ahead:
         pace.chatter_start, pace.chatter_count = t, 0
@@ -42,14 +42,14 @@ def is_chattering(t, pace):
 
 @inlined
 def lengthen_leap(t, pace):
-    """A leap ends at the time t of the part: the next one is longer, and PAUSE events later if the crowd lasts."""
+    """End a leap at the time t of the part: the next leap is longer, after PAUSE events if the crowd lasts."""
     pace.next_leap = min(_LEAP_GROWTH * pace.next_leap, _MAX_LEAP * pace.min_look_ahead)
     pace.chatter_start, pace.chatter_count = t, _CHATTER_EVENTS - _EVENTS_BETWEEN_LEAPS
 
 
 @inlined
 def adapt_look_ahead(step, guard, motion):
-    """A step was ended by `guard`: look further ahead if it was short, or its mode is the one that ended before."""
+    """Adapt the look-ahead after `guard` has ended a step: look further if the step was short, or its mode repeated."""
     pace, contacts = motion.pace, motion.contacts
     if guard in FORCE_GUARDS and (step < pace.look_ahead or contact_mode_hash(contacts) == pace.ended_mode):
         if not pace.look_ahead < _MAX_LOOK_AHEAD * pace.min_look_ahead:

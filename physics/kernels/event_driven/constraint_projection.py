@@ -1,4 +1,4 @@
-"""Take off what rounding and the tolerance leave in the contacts of a mode: a projection in the kinetic metric."""
+"""Remove errors of rounding and tolerance from the contacts of a mode, by a projection in the kinetic metric."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _UNSEEN_SPEED = 0.01
 
 @inlined
 def _projection_step(holding, P, work, motion):
-    """Velocity and turn, both per kinetic metric, that take off `constraint_error` along the rows of the mode."""
+    """Velocity and turn, both per kinetic metric, that remove `constraint_error` along the rows of the mode."""
     k = assemble_unknowns(0.0, holding, work, motion)
     F, T = solve_contact_forces(k, P, work, motion.unknowns)
     s = 1.0 / work.mass
@@ -31,7 +31,7 @@ def _projection_step(holding, P, work, motion):
 
 @inlined
 def _set_velocity_errors(contacts, work):
-    """`constraint_error`: the velocities of the contacts that act; the largest that the mode does not allow [m/s]."""
+    """Write velocities of acting contacts to `constraint_error`; return the largest that the mode forbids [m/s]."""
     worst = 0.0
     for j in range(contacts.count):
         n = wall_normal(work.walls, wall_of(contacts.slot[j], work))
@@ -46,7 +46,7 @@ def _set_velocity_errors(contacts, work):
 
 @inlined
 def _project_velocities(holding, v, m, P, work, motion):
-    """Velocity and angular momentum without the velocities of contacts that the mode does not allow (placed)."""
+    """Velocity and angular momentum without contact velocities that the mode forbids (placed)."""
     worst = _set_velocity_errors(motion.contacts, work)
     if not worst > _UNSEEN_SPEED * motion.thresholds.rounding_speed:
         return v, m
@@ -56,7 +56,7 @@ def _project_velocities(holding, v, m, P, work, motion):
 
 @kernel
 def project_normal_speeds(y, offset_frame, work, motion):
-    """State without the normal velocities of the contacts that act."""
+    """State without normal velocities of the acting contacts."""
     x, q, v, m = y
     R, P, w, alpha = free_angular_motion(y, offset_frame, work)
     set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
@@ -66,7 +66,7 @@ def project_normal_speeds(y, offset_frame, work, motion):
 
 @kernel
 def project_state(y, offset_frame, work, motion):
-    """State without the gaps and velocities of contacts that the contact mode does not allow, where above rounding.
+    """State without gaps and velocities, above rounding, of contacts in the contact mode.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
     """

@@ -1,4 +1,4 @@
-"""Contacts that touch: candidates for acting, what they do, and their accelerations."""
+"""Touching contacts: candidates for acting, their kinds, and their accelerations."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _UNSEEN_APPROACH = 1.0e-2
 
 @kernel
 def find_candidates(y, offset_frame, work, motion):
-    """Features that touch and do not leave, into `candidate`: (count, whether one approaches)."""
+    """Write features that touch and do not leave into `candidate`; return (count, whether one approaches)."""
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, work, smooth)
@@ -93,10 +93,10 @@ def has_normal_speed(motion):
 
 @kernel
 def project_candidate_speeds(y, offset_frame, work, motion):
-    """State without the normal velocities of all candidates that neither come nor go, whether they act or not.
+    """State without normal velocities of all candidates that neither approach nor leave, acting or not.
 
-    A body that lies on two contacts and rocks lower than counts would else come down on the one whenever it is set
-    down on the other. Where those that act have no such velocity one that has just been let go keeps its own.
+    A body may lie on two contacts and rock by less than counts. Setting it down on one contact would otherwise move the
+    other, again and again. If acting contacts have no normal speed, a contact that was just released keeps its own.
     """
     smooth, contacts, candidates, thresholds = motion.smooth, motion.contacts, motion.candidates, motion.thresholds
     if not has_open_candidate(candidates):
@@ -132,7 +132,7 @@ def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates):
 
 @kernel
 def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
-    """True if candidate i slides; its direction into `candidate_direction`."""
+    """True if candidate i slides; writes its direction into `candidate_direction`."""
     candidates = motion.candidates
     wall = wall_of(candidates.slot[i], work)
     n = wall_normal(work.walls, wall)
@@ -158,7 +158,7 @@ def acceleration_scale(w, work):
 
 @inlined
 def has_closing_contact(count, motion):
-    """True if a contact that will leave is still, by a little, on its way in."""
+    """True if a contact that will leave still approaches, by a little."""
     thresholds, candidates = motion.thresholds, motion.candidates
     least = -thresholds.rounding_speed - _UNSEEN_APPROACH * thresholds.rest_speed
     for i in range(count):

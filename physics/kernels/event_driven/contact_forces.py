@@ -1,4 +1,4 @@
-"""Forces of the contacts that act: the acceleration-level problem a = A f + b of a contact mode, and its velocities.
+"""Forces of the acting contacts: the acceleration-level problem a = A f + b of a contact mode, and its velocities.
 
 A contact mode says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
 acceleration; the force is f_n (n - μ d) along the direction d of its sliding). With the acceleration of a contact
@@ -65,7 +65,7 @@ def free_angular_motion(y, offset_frame, work):
 
 @kernel
 def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
-    """Arms, velocities, directions of sliding and free accelerations (`constraint_error`) of the contacts that act."""
+    """Set arms, velocities, sliding directions and free accelerations (`constraint_error`) of the acting contacts."""
     contacts = motion.contacts
     shape, walls = work.shape, work.walls
     dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
@@ -87,7 +87,7 @@ def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
 
 @inlined
 def _add_to_unknown(m, r, push, row, share, unknowns):
-    """Add `given_force` of a contact at r to unknown m."""
+    """Add the contribution of a contact's `given_force` at r to unknown m."""
     h, e = qt.cross(r, push), qt.cross(r, row)
     for c in range(3):
         unknowns.column_force[m, c] += share * push[c]
@@ -98,14 +98,14 @@ def _add_to_unknown(m, r, push, row, share, unknowns):
 
 @inlined
 def sliding_force_direction(mu, axes, j, work, contacts):
-    """Force of contact j, which slides, for each newton along the normal."""
+    """Force of the sliding contact j per newton along the normal."""
     n, d = axes[0], sliding_direction(row_vector(contacts.slip_direction, j, 0), axes, work)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
 def _contact_force_direction(mu, axes, j, work, contacts):
-    """Force of contact j for each newton along the normal."""
+    """Force of contact j per newton along the normal."""
     if contacts.sticks[j]:
         return axes[0]
     return sliding_force_direction(mu, axes, j, work, contacts)
@@ -113,7 +113,7 @@ def _contact_force_direction(mu, axes, j, work, contacts):
 
 @inlined
 def _contact_force(normal, first, second, mu, axes, j, work, contacts):
-    """Force of contact j that presses with `normal` and, where it holds, has these along the other two axes."""
+    """Force of contact j with the push `normal` and, if it sticks, these parts along the other two axes."""
     f = times(normal, _contact_force_direction(mu, axes, j, work, contacts))
     if contacts.sticks[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
@@ -122,7 +122,7 @@ def _contact_force(normal, first, second, mu, axes, j, work, contacts):
 
 @kernel
 def _add_shares(mu, work, motion):
-    """`given_wrench`: force and moment of all shares. Without friction they make no difference, and are left out."""
+    """Sum force and moment of all shares into `given_wrench`; without friction they do not matter and are left out."""
     contacts = motion.contacts
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
@@ -137,7 +137,7 @@ def _add_shares(mu, work, motion):
 
 @inlined
 def _clear_unknowns(m, count, unknowns):
-    """Empty the unknowns m <= k < m + count."""
+    """Clear the unknowns m <= k < m + count."""
     for k in range(m, m + count):
         unknowns.rhs[k] = 0.0
         for c in range(3):
@@ -147,7 +147,7 @@ def _clear_unknowns(m, count, unknowns):
 
 @kernel
 def _add_sticking_unknowns(m, j, first_axis, axes, motion):
-    """Unknowns of contact j from the axis `first_axis` on: the force along each."""
+    """Add the unknowns of the sticking contact j from the axis `first_axis` on: the force along each."""
     r, b = row_vector(motion.contacts.arm, j, 0), row_vector(motion.contacts.constraint_error, j, 0)
     motion.contacts.first_unknown[j] = m
     _clear_unknowns(m, 3 - first_axis, motion.unknowns)
@@ -160,7 +160,7 @@ def _add_sticking_unknowns(m, j, first_axis, axes, motion):
 
 @kernel
 def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
-    """Three unknowns of the normal forces of the contacts first <= j < last, those of one wall."""
+    """Add three unknowns for the normal forces of the contacts first <= j < last, which share a wall."""
     unknowns, contacts = motion.unknowns, motion.contacts
     _clear_unknowns(m, 3, unknowns)
     radius = work.radius
@@ -187,7 +187,7 @@ def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
 
 @kernel
 def assemble_unknowns(mu, holding, work, motion):
-    """Fill the columns, the rows, `given_wrench` and the right-hand sides from `constraint_error`; their number.
+    """Fill columns, rows, `given_wrench` and right-hand sides from `constraint_error`; return the number of unknowns.
 
     `holding`: contacts that hold do so along the wall, too.
     """
@@ -230,7 +230,7 @@ def assemble_unknowns(mu, holding, work, motion):
 
 @kernel
 def recover_contact_forces(mu, work, motion):
-    """Force of each contact that acts (`force`, `normal`) from the unknowns, and the shares where they are in it."""
+    """Force of each acting contact (`force`, `normal`) from the unknowns, with the shares where they count."""
     contacts, unknowns = motion.contacts, motion.unknowns
     for j in range(contacts.count):
         axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
@@ -256,14 +256,14 @@ def recover_contact_forces(mu, work, motion):
 
 @inlined
 def clear_last_forces(contacts):
-    """No force is known from before."""
+    """Forget all earlier forces."""
     for s in range(contacts.last_force.shape[0]):
         contacts.last_force[s, 0] = contacts.last_force[s, 1] = contacts.last_force[s, 2] = 0.0
 
 
 @kernel
 def store_last_forces(work, contacts):
-    """`last_force`: the forces of the contacts that act, none of all others."""
+    """Store the forces of the acting contacts in `last_force`, zero for all others."""
     clear_last_forces(contacts)
     for j in range(contacts.count):
         axes, f = wall_axes(work.walls, wall_of(contacts.slot[j], work)), row_vector(contacts.force, j, 0)

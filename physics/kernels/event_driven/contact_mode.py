@@ -1,14 +1,14 @@
-"""Acceleration-level complementarity problem of a moment: the contacts that act, and their modes.
+"""Contact mode of a moment, from the acceleration-level complementarity problem.
 
     a_n >= 0,  f_n >= 0,  a_n f_n = 0;    a contact that has no tangential velocity holds (a_t = 0, |f_t| <= μ f_n)
     or starts to slide (f_t = -μ f_n a_t/|a_t|); one that has slides on (f_t = -μ f_n u_t/|u_t|)
 
 When no contact slides, these are the conditions of an impact with accelerations in place of velocities, and the same
-solver gives them: exact cones, pivoting behind it. When some slide, contacts change between open, held and sliding
-until all conditions hold; each trial is one linear system (`contact_forces`). Where that goes round in circles the
-solver is asked again, with a large tangential acceleration in place of each contact's sliding. If it can only stop the
-sliding (Painlevé's paradox: a sliding contact may have no force) the velocities have to jump: `step` makes an impulse
-of it.
+solver gives them: exact cones, with pivoting as the fallback. When some slide, contacts change between open, sticking
+and sliding until all conditions hold; each trial is one linear system (`contact_forces`). If the search goes round in
+circles, the solver is called again, with a large tangential acceleration in place of each contact's sliding. If it can
+only stop the sliding (Painlevé's paradox: a sliding contact may have no force), the velocities have to jump, and `step`
+applies an impulse.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from physics.kernels.event_driven.contact_mode_search import search_contact_mode
 
 @kernel
 def find_contact_mode(y, friction, offset_frame, work, motion):
-    """Find the contact mode at y and the contacts that act: (contact mode, number of candidates, acceleration, moment).
+    """Find contact mode and acting contacts at y: (contact mode, number of candidates, acceleration, moment).
 
     `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
     posed in `work`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that

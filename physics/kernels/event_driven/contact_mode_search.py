@@ -1,4 +1,4 @@
-"""Contacts of which some slide: which hold, slide and are open, by trials of one linear system each."""
+"""Search for the contact mode when some contacts slide, by trials of one linear system each."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
 
 @inlined
 def has_last_forces(contacts):
-    """True if any force is known from before."""
+    """True if any force is known from an earlier moment."""
     for s in range(contacts.last_force.shape[0]):
         if contacts.last_force[s, 0] != 0.0:
             return True
@@ -104,7 +104,7 @@ def has_last_forces(contacts):
 
 @kernel
 def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
-    """`search_contact_modes` with the last forces as they are."""
+    """Do `search_contact_modes` with the last forces unchanged."""
     candidates = motion.candidates
     scale = work.acceleration + work.radius * qt.dot(w, w)
     for i in range(count):
@@ -138,7 +138,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
 
 @kernel
 def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, work, motion):
-    """Kinds of the candidates when some of them slide; whether they were found, with the last forces or without."""
+    """Find the kinds of the candidates when some slide, with or without the last forces; return success."""
     if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
         return True
     if not has_last_forces(motion.contacts):

@@ -99,7 +99,7 @@ def put_state_row(smooth, row, state):
 
 @kernel
 def compute_state_rate(row, later, offset_frame, work, motion):
-    """Rate of change of a row of `y`, `later` [s] than START, into `rate`, its contacts' forces into the unknowns."""
+    """Write the rate of change of a row of `y`, `later` [s] than START, into `rate`, and forces into the unknowns."""
     state = get_state_row(motion.smooth, row)
     refresh_loads(state, later, offset_frame, work)
     q, v = state[1], state[2]
@@ -121,7 +121,7 @@ def compute_state_rate(row, later, offset_frame, work, motion):
 
 @kernel
 def set_error_scale(h, work, smooth):
-    """Sizes against which the errors of a step are held, its start made ready by `prepare_extrapolated_step`."""
+    """Set the scales of the errors of a step whose start `prepare_extrapolated_step` has prepared."""
     x, _, v, _ = get_state_row(smooth, ROW_START)
     speed = math.sqrt(qt.dot(v, v)) + work.radius * smooth.start_angular_speed + work.acceleration * h
     place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
@@ -135,7 +135,7 @@ def set_error_scale(h, work, smooth):
 
 @kernel
 def _midpoint_rule(parts, h, offset_frame, work, motion):
-    """One rule with `parts` parts from START, smoothed, into row END."""
+    """Do one midpoint rule with `parts` parts from START, smoothed, into row END."""
     y, rate = motion.smooth.y, motion.smooth.rate
     s = h / parts
     for c in range(Y_SIZE):
@@ -154,7 +154,7 @@ def _midpoint_rule(parts, h, offset_frame, work, motion):
 
 @kernel
 def try_extrapolated_step(h, offset_frame, work, motion):
-    """Row END from row START, h later (`first_rate` known): (relative error, rules used)."""
+    """Compute row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     smooth = motion.smooth
     table, y = smooth.extrapolation_table, smooth.y
     goal = work.tolerance
@@ -195,11 +195,12 @@ def try_extrapolated_step(h, offset_frame, work, motion):
 
 @kernel
 def prepare_extrapolated_step(left, offset_frame, work, motion):
-    """Make row START ready for `try_extrapolated_step`; how long the step should be at most.
+    """Prepare row START for `try_extrapolated_step`; return the longest useful step.
 
-    No longer than the time `left`, what the last step's ease suggests, a turn of TURN_AT_MOST, the time at which a
-    contact that is slowed as it is now stops sliding, and, flying through a field, the time in which the body crosses
-    its radius, so that no wall is reached and left again unseen.
+    The step is limited by the time `left`, by the length that the last step's errors suggest, by a turn of
+    TURN_AT_MOST, and by the time at which a contact with its present deceleration stops sliding. In flight through a
+    field it is also limited by the time in which the body moves by its radius, so that no wall is reached and left
+    again unseen.
     """
     contacts = motion.contacts
     state = get_state_row(motion.smooth, ROW_START)
@@ -230,7 +231,7 @@ def prepare_extrapolated_step(left, offset_frame, work, motion):
 
 @inlined
 def _set_first_rate(offset_frame, work, motion):
-    """`first_rate`: that of START."""
+    """Set `first_rate`, the rate at START."""
     compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     for c in range(Y_SIZE):
         motion.smooth.first_rate[c] = motion.smooth.rate[c]
@@ -238,7 +239,7 @@ def _set_first_rate(offset_frame, work, motion):
 
 @kernel
 def _begin_slide(P, offset_frame, work, motion):
-    """Prepare the only contact, which slides, at START; one that creeps has the direction of `slip_onset`."""
+    """Prepare the only contact, which slides, at START; a creeping one gets the direction of `slip_onset`."""
     contacts = motion.contacts
     contacts.friction_turn_stiffness = friction_turn_stiffness(P, work, motion)
     _, contacts.start_slip_speed = sliding_velocity(0, work, contacts)
@@ -255,7 +256,7 @@ def _begin_slide(P, offset_frame, work, motion):
 
 @inlined
 def _set_slip_turn_rate(offset_frame, work, motion):
-    """`slip_turn_rate` of the only contact, by a look a moment ahead."""
+    """Set `slip_turn_rate` of the only contact, from a state a moment ahead."""
     contacts, pace, smooth = motion.contacts, motion.pace, motion.smooth
     d = row_vector(contacts.slip_direction, 0, 0)
     for c in range(Y_SIZE):

@@ -1,7 +1,8 @@
-"""Forces that fall below what they may, and come back, within one smooth step: not seen at its ends.
+"""Forces that dip below their bounds and come back within one smooth step, unseen at its ends.
 
-As for gaps, the cubic through the margins at both ends and their rates shows it. The rates are differences along the
-motion. Where the cubic comes close to zero the step is made up to its lowest point only, and looked at there.
+The cubic through the margins and their rates at both ends shows such dips, as for gaps. The rates are differences along
+the motion. Where the cubic comes close to zero, the step is made up to its lowest point only, and the margin is tested
+there.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ _CONSTANT_FORCE_RULES = 2
 
 @kernel
 def store_force_margins(row, work, motion):
-    """Margins of push and cone of the contacts that act, from the unknowns, into a row of `margin` [weights]."""
+    """Write the margins of push and cone of the acting contacts, from the unknowns, to a row of `margin` [weights]."""
     contacts = motion.contacts
     recover_contact_forces(work.mu, work, motion)
     for j in range(contacts.count):
@@ -44,7 +45,7 @@ def store_force_margins(row, work, motion):
 
 @inlined
 def _probe_margins(row, t, moment, offset_frame, work, motion):
-    """Margins `moment` after a row of `y` at the time t, of the rate of change `rate`, into INSIDE."""
+    """Write the margins `moment` after a row of `y` at the time t, with the rate of change `rate`, into INSIDE."""
     for c in range(Y_SIZE):
         motion.smooth.y[ROW_CURRENT, c] = motion.smooth.y[row, c] + moment * motion.smooth.rate[c]
     compute_state_rate(ROW_CURRENT, t + moment, offset_frame, work, motion)
@@ -62,9 +63,9 @@ def _cubic_interior_minimum(low, fall, high, rise, h):
 
 @kernel
 def find_force_minimum(h, used, offset_frame, work, motion):
-    """The time within the step of h to END at which a margin of force may be used up, h where there is none.
+    """Earliest time within the step of h to END at which a margin of force may be used up; h without one.
 
-    What is known of the start of the step is in START of `margin`; forces, rates and unknowns are those of END.
+    START of `margin` holds the data of the start of the step; forces, rates and unknowns are those of END.
     """
     contacts, smooth = motion.contacts, motion.smooth
     if contacts.count == 0 or used <= _CONSTANT_FORCE_RULES or not smooth.weight > 0.0:

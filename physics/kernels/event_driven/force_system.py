@@ -1,4 +1,4 @@
-"""Unknown forces of a contact mode: the linear system of `contact_forces`, which rows count, and its solution."""
+"""Linear system for the forces of a contact mode: its independent rows, and its solution (`contact_forces`)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DOUBTFUL_PIVOT = 1.0e-7
 
 @kernel
 def _set_metric(m, P, work, unknowns):
-    """`matrix`: what the rows would have to do with each other if all pushed along themselves; right-hand side 0."""
+    """Fill `matrix` with the products of the rows in their metric, and the right-hand side with 0."""
     inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
     for k in range(m):
         F, g = row_vector(unknowns.row, k, 0), apply_inverse_inertia(P, J, row_vector(unknowns.row_moment, k, 0))
@@ -33,9 +33,9 @@ def _set_metric(m, P, work, unknowns):
 
 @kernel
 def _choose_rows(m, P, work, unknowns):
-    """`independent_row`: the rows that are no sums of others, by their own metric; their number.
+    """Mark rows that are no sums of others in `independent_row`, by their own metric; return their number.
 
-    Of a symmetric matrix without negative directions the largest entry is on the diagonal: columns of pivots are rows.
+    The largest entry of a positive semidefinite matrix is on the diagonal, so columns of pivots are rows, too.
     """
     _set_metric(m, P, work, unknowns)
     rank, _ = solve_full_pivot(m, unknowns.matrix, unknowns.independent_row, unknowns.value)
@@ -44,7 +44,7 @@ def _choose_rows(m, P, work, unknowns):
 
 @kernel
 def _set_rows(rows, m, P, work, unknowns):
-    """`matrix`: the `rows` chosen equations of the m unknowns."""
+    """Fill `matrix` with the `rows` chosen equations of the m unknowns."""
     inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
     F, g = row_vector(unknowns.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(unknowns.given_wrench, 1, 0))
     for i in range(rows):
@@ -66,12 +66,12 @@ def _set_rows(rows, m, P, work, unknowns):
 
 @kernel
 def solve_contact_forces(m, P, work, unknowns):
-    """Solve for the m unknowns, those that add least to the shares; total force and moment of the contacts.
+    """Solve for the m unknowns that change the shares least; return total force and moment of the contacts.
 
-    Contacts can say the same of the body's motion twice. Where each pushes along its row the matrix shows it: what a
-    row has beyond the others, a share e of it, gives a pivot of e². Where one slides, its friction pushes elsewhere,
-    the pivot is of the order e, and a row that differs by rounding from a sum of others would still be met, by forces
-    that stop a body which no contact holds. So where a pivot is small the rows are chosen by their own metric.
+    Rows of two contacts may be dependent. If each contact pushes along its row, the matrix shows it: a row whose
+    independent part is the share e gives a pivot of e². If one slides, its friction pushes elsewhere, and the pivot is
+    of the order e. A row that differs from a sum of others by rounding would then still be solved, by forces that stop
+    a body although no contact holds it. So where a pivot is small the rows are chosen by their own metric.
     """
     for k in range(m):
         unknowns.independent_row[k] = k

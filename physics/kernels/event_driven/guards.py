@@ -1,4 +1,4 @@
-"""Guards that end a contact mode: the smallest of the quantities that have to stay positive during a smooth step.
+"""Guards that end a contact mode: the smallest of the quantities that must stay positive during a smooth step.
 
 - *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
   gaps and their rates at both ends.
@@ -46,7 +46,7 @@ FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 @kernel
 def compute_feature_gaps(row, offset_frame, work, smooth):
-    """Gaps and their rates of all features into column `row` of `gap`; of a wall out of reach infinite."""
+    """Write gaps and rates of all features into column `row` of `gap`, infinite for a wall out of reach."""
     x, q, v, m = get_state_row(smooth, row)
     R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, work)
     dims, features, shape = as_vector(work.dims), work.features, work.shape
@@ -93,8 +93,8 @@ def cubic_minimum(g0, r0, g1, r1, h):
 def least_gap_margin(h, work, motion):
     """Smallest gap of the features that do not act [m] over a step of h.
 
-    Of one that leaves: what it is above where it left, so that a bounce does not end deeper, and gain by it. Of one
-    that touches and neither comes nor goes: what it is above there, and the slop.
+    For a leaving feature this is its height above the place that it left, so that a bounce does not end deeper and gain
+    energy. For one that touches and neither comes nor goes, it is the height above that place plus the slop.
     """
     smooth, thresholds = motion.smooth, motion.thresholds
     least, which = math.inf, -1
@@ -124,7 +124,7 @@ def _cone_excess(j, mu, work, contacts):
 
 @inlined
 def _pair_excess(i, j, mu, work, contacts):
-    """The same of two contacts on one wall, whatever they share of the force along their line [N]."""
+    """Excess over the joint cone of two contacts on one wall, however they share the force along their line [N]."""
     axes = wall_axes(work.walls, wall_of(contacts.slot[i], work))
     a, b = row_vector(contacts.arm, i, 0), row_vector(contacts.arm, j, 0)
     e = unstretch_force((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
@@ -146,7 +146,7 @@ def _pair_excess(i, j, mu, work, contacts):
 
 @kernel
 def cone_excess(j, work, contacts):
-    """Excess of contact j, which holds with the others of its wall that hold, over its friction cone [N]."""
+    """Excess [N] of the sticking contact j over its friction cone, together with its wall's other sticking contacts."""
     wall, other, holding = wall_of(contacts.slot[j], work), j, 1
     for k in range(contacts.count):
         if k != j and contacts.sticks[k] and wall_of(contacts.slot[k], work) == wall:
@@ -159,7 +159,7 @@ def cone_excess(j, work, contacts):
 
 @inlined
 def least_inactive_pull(work, motion):
-    """Least pull [N] that the affine force of a sliding face has at a touching vertex which does not act."""
+    """Least pull [N] of a sliding face's affine force at a touching vertex that does not act."""
     contacts = motion.contacts
     least, which = math.inf, -1
     for j in range(contacts.count):
@@ -192,7 +192,7 @@ def least_inactive_pull(work, motion):
 
 @inlined
 def opposite_face_contact(slot, wall, work, contacts):
-    """The contact of a face of three that is farthest from the vertex `slot`: all its bits but the face's differ."""
+    """Contact of a face of three opposite to the vertex `slot`, in all bits but the face's."""
     best, most = -1, -1
     for i in range(contacts.count):
         if wall_of(contacts.slot[i], work) == wall:
@@ -205,7 +205,7 @@ def opposite_face_contact(slot, wall, work, contacts):
 
 @kernel
 def least_force_margin(slack, work, motion):
-    """Smallest margin of the guards of force, of which `slack` counts as none: (margin, guard, contact or slot)."""
+    """Smallest margin of the force guards, of which `slack` counts as none: (margin, guard, contact or slot)."""
     contacts, smooth = motion.contacts, motion.smooth
     margin, guard, which = math.inf, GUARD_NONE, -1
     for j in range(contacts.count):
@@ -224,7 +224,7 @@ def least_force_margin(slack, work, motion):
 
 @kernel
 def least_start_force_margin(offset_frame, work, motion):
-    """Smallest margin of force at START, nothing of it rounding."""
+    """Smallest margin of force at START, above rounding."""
     compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
     recover_contact_forces(work.mu, work, motion)
     return least_force_margin(0.0, work, motion)[0]
@@ -234,7 +234,7 @@ def least_start_force_margin(offset_frame, work, motion):
 def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
-    `heeds`: the guards of force count, where they are missed by more than `slack`.
+    `heeds`: True if the force guards count; they end a step when they are below zero by more than `slack`.
     """
     smooth, contacts, thresholds = motion.smooth, motion.contacts, motion.thresholds
     compute_state_rate(ROW_END, h, offset_frame, work, motion)

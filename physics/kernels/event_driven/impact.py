@@ -1,4 +1,4 @@
-"""Impulses: what a contact problem asks of an impact, and of a leap where no force is consistent."""
+"""Impulses of impacts, and of leaps where no force is consistent, from contact problems."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ _ALL_AT_ONCE = -1
 
 @inlined
 def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
-    """Velocity asked of a contact that approaches with `speed`; what a bounce too short leaves out is noted.
+    """Target velocity of a contact that approaches with `speed`; stores the time of bounces that are too short.
 
-    One that leaves may be turned round, to come in at e times that speed and collide next: were it only stopped, its
-    impulse would do work on what leaves, and the energy grow.
+    A leaving contact may be reversed, to approach at e times its speed and collide next. If it were only stopped, its
+    impulse would do work on it, and the energy would grow.
 
     With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
     follow it t e/(1 - e).
@@ -72,10 +72,10 @@ def takes_part_in_impact(s, motion):
 
 @inlined
 def next_sequential_impact(work, motion, report):
-    """The feature that collides alone, that which approaches fastest; _ALL_AT_ONCE where they do at once.
+    """Feature that collides alone because it approaches fastest; _ALL_AT_ONCE where all collide at once.
 
-    Which is so, too, after `_MAX_SEQUENTIAL_IMPACTS` at one moment, which the report counts as a problem not solved to
-    its tolerance.
+    All collide at once also after `_MAX_SEQUENTIAL_IMPACTS` at one moment; the report counts this as a problem not
+    solved to its tolerance.
     """
     if not motion.thresholds.is_sequential:
         return _ALL_AT_ONCE
@@ -92,7 +92,7 @@ def next_sequential_impact(work, motion, report):
 
 @kernel
 def set_up_impact_problem(y, offset_frame, work, motion, report):
-    """Write the contact problem of all contacts that touch, or that of the one whose turn it is; their number."""
+    """Write the contact problem of all touching contacts, or of the next in turn; return their number."""
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, work, smooth)
@@ -122,9 +122,9 @@ def _no_tangential_target(*arguments):
 
 @if_law((LAW_TANGENTIAL,), _no_tangential_target)
 def set_tangential_rebound(n, y, offset_frame, motion, work):
-    """Set targets along the wall of the one contact that bounces, as `tangential_restitution.set_tangential_targets`.
+    """Set targets along the wall of the single bouncing contact, as `tangential_restitution.set_tangential_targets`.
 
-    What does not rebound though it has a restitution is a bounce left out, and is not one along the wall either.
+    A contact with a restitution but without a rebound is a bounce left out; it has no rebound along the wall either.
     """
     bouncing, found = 0, 0
     for i in range(n):
@@ -137,13 +137,13 @@ def set_tangential_rebound(n, y, offset_frame, motion, work):
 
 @inlined
 def report_impact_solve(solved, report, work):
-    """Add a contact problem, which is solved to rounding, to the world's report."""
+    """Add a contact problem, solved to rounding, to the world's report."""
     report_solve(report, work.world, *solved[2:], max(work.tolerance, _ROUNDING_RESIDUAL))
 
 
 @inlined
 def _solve_plastic_impact(n, contact, v, L, solved, P, work, report):
-    """The same collision solved without any rebound; what `solved` has cost goes into the report."""
+    """Solve the same collision without any rebound; the cost of `solved` goes into the report."""
     report_impact_solve(solved, report, work)
     set_plastic_targets(n, work)
     return solve_contacts(n, contact, v, L, P, work)
@@ -151,10 +151,10 @@ def _solve_plastic_impact(n, contact, v, L, solved, P, work, report):
 
 @kernel
 def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
-    """Result of `solve_contacts` for a collision, or an impact without rebound where that was no solution.
+    """Result of `solve_contacts` for a collision; of an impact without rebound if that is no solution.
 
-    With friction two contacts may hold any stress along the line between them, which no impulse lengthens: where one is
-    asked to rebound along it and neither slides, Newton's law and Coulomb's have no solution together.
+    With friction two contacts may hold any stress along the line between them, and no impulse moves one of them along
+    it. If a rebound along the line is wanted and neither slides, Newton's law and Coulomb's have no common solution.
     """
     is_asked = False
     for i in range(n):
@@ -166,9 +166,9 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
 
 @kernel
 def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, contacts, report):
-    """Result of `solve_contacts` for a collision with friction, or as much of its rebound as there is energy for.
+    """Result of `solve_contacts` for a collision with friction, its rebound limited to the available energy.
 
-    Impulses are those of what is returned. See `physics.kernels.contact_law.restitution_energy`.
+    The impulses in `work` are those of the result. See `physics.kernels.contact_law.restitution_energy`.
     """
     _, q, v, L = y
     v_full, L_full = solved[0], solved[1]
@@ -218,7 +218,7 @@ def principal_rotation(y, offset_frame, work):
 
 @kernel
 def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
-    """State after the impulses of a collision at the time t, of all that touches or of the one whose turn it is."""
+    """State after the impulses of a collision at the time t, of all touching contacts or of the next in turn."""
     refresh_loads(y, 0.0, offset_frame, work)
     n = set_up_impact_problem(y, offset_frame, work, motion, records.report)
     set_tangential_rebound(n, y, offset_frame, motion, work)
@@ -247,7 +247,7 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
 
 @kernel
 def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records):
-    """State with the velocities of a first-order step over h from the time t: a leap, before it is made."""
+    """State with the velocities of a first-order step over h from the time t, before a leap."""
     refresh_loads(y, 0.0, offset_frame, work)
     n, v, L = set_up_jump_problem(y, h, offset_frame, work, motion)
     if n > 0:  # there may be nothing in reach

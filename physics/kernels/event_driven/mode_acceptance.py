@@ -1,9 +1,10 @@
-"""Steps of a contact mode whose guards of force say nothing: the search for the contact mode judges them, after each.
+"""Judge steps of a contact mode with unreliable force guards, by a search for the contact mode after each.
 
-Where contacts are more than the body's motion needs, their forces can be shared out in many ways, of which the linear
-system takes one. That one may leave a cone, or pull, where others hold: the guard ends the mode and the search finds
-the same one again. Then these guards are not heeded for it. After every step the mode is looked for, and the step is
-taken back and made shorter when the acceleration has jumped in it: then another contact mode had begun before its end.
+Where there are more contacts than the body's motion needs, their forces can be distributed in many ways. The linear
+system takes one of them, which may leave a cone, or pull, where others do not. The guard then ends the mode, and the
+search finds the same mode again. In this case force guards are ignored. The mode is searched after every step instead.
+If the acceleration has jumped within the step, another contact mode had begun before its end, and the step is taken
+back and shortened.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ NO_MODE = 0
 
 @inlined
 def contact_mode_hash(contacts):
-    """A number for which contacts act and which of them hold."""
+    """Number that identifies the acting contacts and the sticking ones among them."""
     name = 1
     for j in range(contacts.count):
         name = 131 * name + 2 * contacts.slot[j] + contacts.sticks[j]
@@ -42,20 +43,20 @@ def contact_mode_hash(contacts):
 
 @inlined
 def has_trusted_guards(motion):
-    """True if the guards of force say something of this contact mode."""
+    """True if the force guards are reliable in this contact mode."""
     return motion.pace.distrusted_mode == NO_MODE or contact_mode_hash(motion.contacts) != motion.pace.distrusted_mode
 
 
 @inlined
 def distrust_force_guards(nearest, motion):
-    """The guards of force are not heeded for this contact mode any more."""
+    """Ignore the force guards in this contact mode from now on."""
     motion.pace.distrusted_mode = contact_mode_hash(motion.contacts)
     motion.pace.watched_length = _FIRST_TRUST_STEP * nearest
 
 
 @kernel
 def has_acceleration_jumped(what, y, offset_frame, work, motion):
-    """True if the step that led to y went too far: what the body does there does not go on from what it did."""
+    """True if the step that led to y went too far: the acceleration there does not continue the earlier one."""
     smooth, pace = motion.smooth, motion.pace
     if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return False
@@ -73,7 +74,7 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
 
 @kernel
 def accept_step(what, watched, y, offset_frame, work, motion):
-    """Judge the mode at y; GOES_BACK where the watched step that led there was too long, and no mere look-ahead."""
+    """Judge the contact mode at y; GOES_BACK if the step that led there was too long and must be repeated."""
     if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
         return MODE_ROLLBACK
     return what

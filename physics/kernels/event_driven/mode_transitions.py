@@ -1,4 +1,4 @@
-"""Contact mode of a body at the walls: logged as events when it changes, and remembered from step to step."""
+"""Contact mode of a body at the walls: changes are logged as events, and the mode is kept between steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WALL_SEPARATED, WALL_SLIPPING, WALL_STICKING = range(3)
 
 @kernel
 def log_mode_changes(work, motion, log, counts, t):
-    """Events of the walls at which the body now does something else."""
+    """Log events of the walls at which the contact changes."""
     for wall in range(work.walls.shape[0]):
         state = WALL_SEPARATED
         for j in range(motion.contacts.count):

@@ -1,14 +1,15 @@
-"""The direction in which a contact begins to slide, while it is too slow to have one.
+"""Direction in which a contact begins to slide, at a speed too small to define it.
 
-Friction that is used up lets go without a jump: the acceleration grows from zero, and the slip |u| with the square of
-the time. Its direction follows what acts at the rate K/|u|, K the acceleration that friction gives across it for each
-radian: stiff beyond all bounds. But it is known without: with φ the angle of u and a(φ) the acceleration under the
-friction opposed to it,
+A contact at the limit of friction begins to slide without a jump: the acceleration grows from zero, and the slip |u|
+with the square of the time. Its direction follows the loads at the rate K/|u|, where K is the acceleration that
+friction gives across it for each radian. This is stiff beyond all bounds. But the direction is known without the speed.
+With φ the angle of u and a(φ) the acceleration under the friction opposed to it,
 
     a(φ)·d⊥ = |u| φ'.
 
-Without the right-hand side that is the direction which nothing turns. With it, φ' the rate at which that one turns, and
-over 1 + |u|'/K since φ lags behind it by |u| φ'/K, which grows, what is left out is of the order (|u|'/K)² of it.
+Without the right-hand side this gives the direction that nothing turns; let φ' be the rate at which that one turns. The
+right-hand side is divided by 1 + |u|'/K, since φ lags behind by |u| φ'/K, which grows. The relative error is of the
+order (|u|'/K)².
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ def contact_velocity_rate(j, P, work, motion):
 
 @inlined
 def friction_turn_stiffness(P, work, motion):
-    """K of the only contact, from `first_rate` [m/s²]."""
+    """Turning stiffness K of the only contact, from `first_rate` [m/s²]."""
     n = wall_normal(work.walls, wall_of(motion.contacts.slot[0], work))
     across = qt.cross(n, row_vector(motion.contacts.start_slip_direction, 0, 0))
     moment = qt.cross(row_vector(motion.contacts.arm, 0, 0), across)
@@ -80,7 +81,7 @@ def friction_turn_stiffness(P, work, motion):
 
 @inlined
 def has_one_sliding_contact(work, contacts):
-    """True if one contact acts, which slides with friction."""
+    """True if one contact acts, and it slides with friction."""
     return contacts.count == 1 and contacts.sticks[0] == 0 and work.mu > 0.0
 
 
@@ -95,13 +96,13 @@ def _is_small(share, speed, work, motion):
 
 @inlined
 def is_creeping(growth, speed, work, motion):
-    """True if a slip that grows at the rate `growth` is so slow, and grows so little, that only loads turn it."""
+    """True if a slip that grows at the rate `growth` is so slow, and grows so slowly, that only loads turn it."""
     return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, work, motion)
 
 
 @inlined
 def has_outrun_creep(h, work, motion):
-    """True if the only contact begins to slide, and goes too far for that in the step of h to END, placed."""
+    """True if the only contact begins to slide, and goes beyond creeping in the step of h to END, placed."""
     contacts = motion.contacts
     if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
         return False
@@ -116,7 +117,7 @@ def has_outrun_creep(h, work, motion):
 
 @inlined
 def _slip_accelerations(angle, first, second, axes, P, work, contacts):
-    """Acceleration of contact 0 (across, along) the direction in which it slides: `angle` from `first` to `second`."""
+    """Accelerations of contact 0 (across, along) its sliding direction, `angle` from `first` to `second`."""
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
@@ -130,9 +131,9 @@ def _slip_accelerations(angle, first, second, axes, P, work, contacts):
 
 @kernel
 def set_slip_onset_direction(P, work, contacts):
-    """Let the one contact that acts begin to slide in the direction above, and place `slip_direction`.
+    """Set `slip_direction` of the only acting contact to the direction of the module, and place it.
 
-    More contacts than one begin in the directions that they were found with.
+    Several contacts begin to slide in the directions with which they were found.
     """
     if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
         return

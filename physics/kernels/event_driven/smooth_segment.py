@@ -1,4 +1,4 @@
-"""Smooth motion of a contact mode up to the guard that ends it, and a look at what comes next."""
+"""Smooth motion of a contact mode up to the guard that ends it, and a prediction of the next mode."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _REST_SPEED_SHARE = 1.0e-6
 
 @inlined
 def newton_time_to_gap(t, margin, guard, which, work, smooth):
-    """Newton's step for the time at which the gap that was missed at END, t after START, is closed; -1 without one."""
+    """Newton's step to the time at which the gap that was missed at END, t after START, closes; -1 without one."""
     if guard != GUARD_GAP or not smooth.gap_rate[ROW_END, which] < 0.0:
         return -1.0
     return t - margin * work.radius / smooth.gap_rate[ROW_END, which]
@@ -63,13 +63,13 @@ def newton_time_to_gap(t, margin, guard, which, work, smooth):
 
 @kernel
 def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
-    """End the step where its smallest margin is zero (END): (its length, guard, contact or slot).
+    """Move the end of the step (END) to the zero of its smallest margin: (its length, guard, contact or slot).
 
-    Newton's steps for a gap. Else false position with the Illinois rule, and a half where PATIENCE trials have not
-    halved what is left. NO_STEP where a shorter step fails that was to be smooth: the margin changes its sign at a pole
-    (Painlevé), which the whole step did not see.
+    The zero of a gap is found by Newton's steps, other zeros by false position with the Illinois rule. A bisection
+    follows where PATIENCE trials have not halved the interval. NO_STEP is returned where a shorter step fails although
+    the motion should be smooth: the margin changes its sign at a pole (Painlevé), unseen by the whole step.
 
-    A force that was there at the start ends where it is zero, not where it is missed by more than rounding.
+    A force that is positive at the start ends at its zero, not where it is below zero by more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     slack = FORCE_MARGIN_TOLERANCE
@@ -118,7 +118,7 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
 
 @inlined
 def has_slip_stopped(guard, which, work, motion):
-    """True if the contact that ended a step nearly stands still there: then that is the end, not before."""
+    """True if the contact that ended a step nearly stands still there, so that the sliding ends there, not before."""
     if guard != GUARD_SPEED:
         return False
     return sliding_velocity(which, work, motion.contacts)[1] <= motion.thresholds.slip_stop_speed
@@ -126,9 +126,10 @@ def has_slip_stopped(guard, which, work, motion):
 
 @kernel
 def slide_to_stop(which, left, heeds, offset_frame, work, motion):
-    """Let contact `which`, which slides at END as slowly as counts as none, do so until it stands still: the time [s].
+    """Let contact `which`, which slides slower than the limit at END, slide until it stands still: the time [s].
 
-    Its direction stays what it is. Not where something else would end within that time, or it began to slide only now.
+    The direction stays the same. Returns 0 if another event would come within it, or if the contact has only
+    begun to slide.
     """
     contacts, smooth, thresholds = motion.contacts, motion.smooth, motion.thresholds
     if contacts.is_starting[which]:
@@ -163,14 +164,14 @@ def slide_to_stop(which, left, heeds, offset_frame, work, motion):
 
 @inlined
 def body_speed_bound(y, offset_frame, work):
-    """Speed that no point of the body exceeds [m/s]."""
+    """Bound of the speed of any point of the body [m/s]."""
     v, w = y[2], angular_velocity(y[1], y[3], work, offset_frame)
     return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
 
 
 @inlined
 def _begin_next_step(left, offset_frame, work, motion):
-    """Length of the next step, which starts where the last one has ended."""
+    """Length of the next step, from the end of the last one."""
     smooth = motion.smooth
     for s in range(smooth.is_active.shape[0]):
         gap, rate = smooth.gap[ROW_END, s], smooth.gap_rate[ROW_END, s]
@@ -184,7 +185,7 @@ def _begin_next_step(left, offset_frame, work, motion):
 def integrate_segment(y, left, offset_frame, work, motion):
     """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
 
-    Where guards of force are not heeded one step, no longer than `watched_length`: its guard is WATCH at least.
+    Where the force guards do not count, one step is taken, at most `watched_length` long: its guard is WATCH at least.
     """
     smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds
     heeds = has_trusted_guards(motion)
@@ -245,7 +246,7 @@ def integrate_segment(y, left, offset_frame, work, motion):
 
 @kernel
 def predict_state(y, offset_frame, work, motion):
-    """State to which the contact mode would lead in a moment."""
+    """Predicted state of the contact mode after a moment."""
     pace = motion.pace
     put_state_row(motion.smooth, ROW_START, y)
     pace.step_length = pace.look_ahead

@@ -96,9 +96,9 @@ _NO_FORCED_MODE = -1
 def set_event_thresholds(y, h, offset_frame, work, motion):
     """Set the gap and speed that count as zero, and the look-ahead of a mode; problems are solved to rounding.
 
-    Gaps are differences of places, wherever the body may go within h.
-    A contact is still when the speed would not lift it by `_UNSEEN_HOP_GAPS` gaps that count as none: a bounce as low
-    as that would gain from being set down on the wall what it loses in the impact.
+    The gap that counts as zero covers the rounding of any place that the body may reach within h. The speed that counts
+    as zero lifts a contact by less than `_UNSEEN_HOP_GAPS` such gaps. In a lower bounce the energy error of setting the
+    body down on the wall would be as large as the loss of the impact.
     """
     thresholds = motion.thresholds
     work.residual_limit = work.target_error_limit = 0.0
@@ -126,9 +126,9 @@ def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
 
 @kernel
 def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, report):
-    """Find the contact mode from y on, and whether a contact problem had to be solved, since the body may come to rest.
+    """Find the contact mode from y on; return whether a contact problem was solved, since the body may come to rest.
 
-    It is looked for a moment ahead where a guard has foretold that the contact mode ends.
+    If a guard has foretold the end of the contact mode, the next one is looked for a moment later.
     """
     seen, later = y, 0.0
     if is_foretold:
@@ -152,7 +152,7 @@ def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, 
 
 @kernel
 def come_to_rest(y, t, offset_frame, work, motion, log, counts):
-    """State of what rests from the time t on."""
+    """State of a body that rests from the time t on."""
     if motion.smooth.is_resting:
         return y
     motion.smooth.is_resting = 1
@@ -163,7 +163,7 @@ def come_to_rest(y, t, offset_frame, work, motion, log, counts):
 
 @kernel
 def integrate_mode(what, y, t, h, flight, work, motion, report):
-    """Move, fly or leap from y, at the time t of a part of length h: (state, time it took, the guard that ended it)."""
+    """Move, fly or leap from y, at the time t of a part of length h: (state, its duration, guard that ended it)."""
     if what == MODE_INCONSISTENT:
         report[work.world, at.FALLBACKS] += 1.0
         step = min(motion.pace.next_leap, h - t)
@@ -179,7 +179,7 @@ def integrate_mode(what, y, t, h, flight, work, motion, report):
 
 @kernel
 def advance(y, h, contact, flight, work, motion, records, start):
-    """State after h: each turn finds the mode of the body (`forced_mode` where it is known) and follows it.
+    """State after h: each turn finds the mode of the body (`forced_mode` if it is known) and follows it.
 
     A step whose end has to be accepted (`mode_acceptance`) began at `rollback_state` and has the length `watched`.
     """

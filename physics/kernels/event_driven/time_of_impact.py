@@ -1,4 +1,4 @@
-"""Flight: the time at which the first feature of a body reaches a wall, to rounding and without a miss.
+"""Flight up to the first contact of a feature with a wall, whose time is found to rounding and never missed.
 
 Over a time τ_h the gap of a feature is bounded below by
 
@@ -88,7 +88,7 @@ def parabola_root(g, r, b):
 
 @inlined
 def gap_safe_time(g, r, b, third, horizon):
-    """A time within which a gap g with rate r, second derivative b and third at most `third` is not used up."""
+    """Time within which a gap g with rate r, second derivative b and third at most `third` cannot close."""
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
     for _ in range(_MAX_HORIZON_DOUBLINGS):
         over = min(horizon, 2.0 * t)
@@ -120,10 +120,10 @@ def gap_jerk_bound(y, left, offset_frame, work):
 
 @kernel
 def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
-    """A time within which no feature at y reaches a wall, at most `left`.
+    """Time within which no feature at y can reach a wall, at most `left`.
 
-    Those that touch and do not come stay away for `assured_time` at least: where a push has just ended, what lifts
-    them is still zero.
+    Features that touch and do not approach stay away for `assured_time` at least: just after a push has ended, the
+    acceleration that lifts them is still zero.
     """
     x, v = y[0], y[2]
     R, _, w, alpha = free_angular_motion(y, offset_frame, work)
@@ -178,7 +178,7 @@ def integrate_free_flight(y, t, offset_frame, work, motion):
 
 @inlined
 def count_unresolved_flight(report, work):
-    """Count a flight that extrapolated steps cannot follow; if there are fields, it is they that are not resolved."""
+    """Count a flight that extrapolated steps cannot follow; with fields, they are not resolved."""
     report[work.world, at.UNRESOLVED] += 1.0
     if has_fields(work):
         report[work.world, at.UNRESOLVED_MOTION] += 1.0
@@ -188,7 +188,8 @@ def count_unresolved_flight(report, work):
 def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
     """State after the time t without contact.
 
-    Turned or swung by more than extrapolated steps can follow, the rest of t is time stepping's, which is reported.
+    A body that turns or swings faster than extrapolated steps can follow moves by time stepping for the rest of t,
+    which is reported.
     """
     if has_torque(work) or has_fields(work):
         reset_felt_flag(work)
@@ -207,8 +208,8 @@ def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
 def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
-    It may end earlier, where a feature flies so close along a wall that `_MAX_ADVANCES` steps did not tell: no wall is
-    missed.
+    The flight may end earlier, if a feature flies so close along a wall that `_MAX_ADVANCES` steps did not decide: no
+    wall is missed.
     """
     motion.contacts.count = 0
     if has_fields(work):

@@ -1,4 +1,4 @@
-"""Scratch memory of one thread for the event-driven scheme: contacts that act, their forces, stages of smooth motion.
+"""Scratch memory of one thread for the event-driven scheme: acting contacts, their forces, rows of smooth motion.
 
 `Motion` is a named tuple of groups, one for each part of a step. Each is a record whose fields are named in a function
 below, since their sizes depend on the walls and on the features of a body: `contacts` at most act at once, `slots` are
@@ -30,7 +30,7 @@ MAX_MIDPOINT_RULES = 8
 
 
 class Motion(NamedTuple):
-    """Groups of the scratch memory: arrays of one record each in Python, the records themselves within a kernel."""
+    """Groups of the scratch memory: arrays of one record in Python, records in a kernel."""
 
     thresholds: np.ndarray  # what counts as zero and as one
     pace: np.ndarray  # when the next contact mode is looked for, and how far a step is trusted

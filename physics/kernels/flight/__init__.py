@@ -1,1 +1,1 @@
-"""Motion of a body that touches nothing: the exact flow, and the textbook integrators."""
+"""Motion of a body without contact: the exact flow, and the textbook integrators."""

@@ -1,4 +1,4 @@
-"""Free motion of one body over a time: the parabola and the rotation, exact; and the textbook schemes."""
+"""Free motion of one body: parabola and exact rotation, and the textbook schemes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The flow of the free rigid body, exact to rounding at any spin rate and without elliptic functions.
+"""Flow of the free rigid body, exact to rounding at any spin rate and without elliptic functions.
 
 Let m be the angular momentum in the principal frame, J the inverse principal
 moments, a = (J3 - J2, J1 - J3, J2 - J1). Euler's equations are m1' = a1 m2 m3
@@ -87,7 +87,8 @@ MANY_TURNS = 50.0
 def write_attitude_series(J1, J2, J3, out):
     """Coefficients of the series s and d, of one body or of many at once.
 
-    Without a kernel for the bodies of a new world, since that would have to be compiled first; `attitude_series` is it.
+    For the bodies of a new world it runs without a kernel, which would have to be compiled first; `attitude_series` is
+    the kernel.
 
     Parameters
     ----------
@@ -126,8 +127,9 @@ attitude_series = kernel(write_attitude_series)
 def _half_angle(x, square):
     """(e0, 1/e0) from x = |e0 e|², that is e0² = (1 + √(1 - 4x)) / 2, by their series.
 
-    The roots would stand one after the other in the longest chain of the step. 4x = sin² of an angle up to
-    `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
+    Series replace two square roots, which would follow each other in the longest chain of the step. 4x = sin² of an
+    angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are
+    under 3e-17.
     """
     xx = x * x
     if square > TINY_SQUARE:
@@ -201,7 +203,7 @@ def _part(q, m_body, J_body, c, mm, energy2, square, h):
 
 @kernel
 def momentum_period(m, J):
-    """Time [s] after which the momentum m in the principal frame returns; inf where it does not (on the separatrix)."""
+    """Period [s] of the momentum m in the principal frame; inf on the separatrix, where it does not return."""
     one, two, three = (J[0], m[0] * m[0]), (J[1], m[1] * m[1]), (J[2], m[2] * m[2])
     if one[0] > two[0]:
         one, two = two, one
@@ -222,14 +224,14 @@ def momentum_period(m, J):
 
 @inlined
 def _is_steady(m, J):
-    """True if the momentum m in the principal frame stays as it is: no gyroscopic torque."""
+    """True if the momentum m in the principal frame is constant, without gyroscopic torque."""
     first, second, third = (J[2] - J[1]) * m[1] * m[2], (J[0] - J[2]) * m[2] * m[0], (J[1] - J[0]) * m[0] * m[1]
     return first == 0.0 and second == 0.0 and third == 0.0
 
 
 @inlined
 def _turn_steadily(q, L, mm, energy2, h):
-    """Attitude after h of a body whose momentum in the principal frame stays as it is."""
+    """Attitude after h of a body whose momentum in the principal frame is constant."""
     s = h * (energy2 / mm)
     return qt.renormalise(qt.multiply(qt.exp_map((s * L[0], s * L[1], s * L[2])), q))
 
@@ -247,7 +249,7 @@ def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
 
 @kernel
 def _turn_far(q, m, L, J, series, mm, energy2, h):
-    """Attitude after a turn beyond `PART_ANGLE_LIMIT`: by parts, and of many turns by periods of the momentum."""
+    """Attitude after a turn beyond `PART_ANGLE_LIMIT`: by parts, and many turns by periods of the momentum."""
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:
         return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it

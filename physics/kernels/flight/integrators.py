@@ -158,7 +158,7 @@ def rk4_attitude(q, L, torque, J, h):
 
 @kernel
 def parabola(x, v, a, h):
-    """x + h (v + h a / 2): what any scheme of order 2 or more makes of a held acceleration."""
+    """x + h (v + h a / 2), the result of any scheme of order 2 or more for a constant acceleration."""
     return _along3(x, h, _along3(v, 0.5 * h, a))
 
 
@@ -267,8 +267,7 @@ def matrix_rk4(y, load, inertia, h):
 def step(scheme, y, load, inertia, h):
     """One step of the scheme with code `scheme` (int); see the module for the rest.
 
-    A code that is none of the four gives a state of NaN: the layer above
-    checks the code, and this cannot be taken for a result.
+    An unknown code gives a state of NaN, which cannot be taken for a result; the layer above checks the code.
     """
     if scheme == EXPLICIT_EULER:
         return explicit_euler(y, load, inertia, h)

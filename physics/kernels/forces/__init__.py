@@ -1,1 +1,1 @@
-"""Force fields: forces and torques that depend on where a body is, how it moves, and when. One file per field."""
+"""Force fields: forces and torques that depend on pose, velocities and time of a body. One file per field."""

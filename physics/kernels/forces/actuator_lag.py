@@ -1,4 +1,4 @@
-"""Actuator law of a command: limits, and the exact first-order lag over a time in which it is held."""
+"""Actuator law of a command: limits, and the exact first-order lag while the command is held."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ def clamp_command(command, limit_force, limit_torque):
 
 @entry_kernel
 def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
-    """Let `output` follow a held `command`, both (rows, 6); its mean meanwhile, times `share`, goes to `applied`.
+    """Let `output` follow a held `command`, both (rows, 6); add its mean over the time, times `share`, to `applied`.
 
-    Of the distance between them the share `gone` has gone at the end, and `kept` is left in the mean.
+    The output covers the share `gone` of its distance to the command by the end; the share `kept` of it is missing in
+    the mean.
     """
     for i in range(command.shape[0]):
         for c in range(6):

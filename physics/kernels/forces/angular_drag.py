@@ -42,7 +42,7 @@ def angular_drag_rates(state, p, J, h):
 
 @inlined
 def soften_angular_drag(loads, h, R, state, p, J):
-    """Loads as `implicit_loads` has them, axis by axis."""
+    """Softened loads of `implicit_loads`, axis by axis."""
     a, T = loads
     z, m = h * _slope(state, p), qt.transposed_matvec(R, T)
     m = (

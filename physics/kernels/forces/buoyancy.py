@@ -1,6 +1,6 @@
 """Buoyancy in a fluid at rest below a plane: F = ρ g V n at the centre of the submerged part.
 
-Its energy is ρ g V times the depth of that centre: lifting the body lets the fluid fill what it leaves.
+Its energy is ρ g V times the depth of that centre, since a lifted body leaves its place to the fluid.
 
 References
 ----------
@@ -28,7 +28,7 @@ BUOYANCY_SIZE = 5
 
 @inlined
 def _wet(state, p):
-    """Volume of the submerged part, its centre relative to the centre of mass, and the height of that."""
+    """Volume of the submerged part, its centre relative to the centre of mass, and the height of that centre."""
     n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
     height = qt.dot(n, plus(state.x, state.center)) - p[FLUID_OFFSET]
     volume, centre = submerged_part(state.shape, state.dims, qt.transposed_matvec(state.R, n), height)
@@ -55,7 +55,7 @@ def buoyancy_energy(state, p, t):
 
 @inlined
 def _largest_section(state):
-    """Bound of the area in which a plane cuts the body [m²]: of its largest shadow."""
+    """Bound of the area of a plane section of the body [m²]: its largest shadow."""
     d = state.dims
     a = (d[1] * d[2], d[2] * d[0], d[0] * d[1])
     size = math.sqrt(qt.dot(a, a))
@@ -92,7 +92,7 @@ def buoyancy_rates(state, p, J, h):
 
 @inlined
 def soften_buoyancy(loads, h, R, state, p, J):
-    """Loads as `implicit_loads` has them, with the bounds of the stiffness."""
+    """Softened loads of `implicit_loads`, with the bounds of the stiffness."""
     heave, roll = _squares(state, p, J, h)
     n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
     s = 0.25 * h * h

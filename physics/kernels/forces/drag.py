@@ -1,4 +1,4 @@
-"""Drag: what the air (or water) takes from the velocity of a body.
+"""Drag of air or water on the velocity of a body.
 
     F = -(½ ρ C A(u) |u| + c) u,    u = velocity of the geometric centre relative to the air
 
@@ -60,7 +60,7 @@ def drag(state, p, t):
 
 @inlined
 def _slopes(state, p):
-    """Relative velocity u, and how fast the force grows along it and across [N s/m]: the quadratic part twice along."""
+    """Relative velocity u, and slopes of the force along and across u [N s/m]; the quadratic part is doubled along."""
     u = minus(velocity_at(state, state.center), state.air)
     quadratic = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u)
     return u, 2.0 * quadratic + p[DRAG_LINEAR], quadratic + p[DRAG_LINEAR]
@@ -79,7 +79,7 @@ def drag_rates(state, p, J, h):
 
 @inlined
 def soften_drag(loads, h, R, state, p, J):
-    """Loads as `implicit_loads` has them; exact for the quadratic law along a line: v' = v/(1 + h k v/m)."""
+    """Softened loads of `implicit_loads`; exact for the quadratic law along a line: v' = v/(1 + h k v/m)."""
     u, along, across = _slopes(state, p)
     speed = math.sqrt(qt.dot(u, u))
     n = (1.0, 0.0, 0.0)

@@ -1,10 +1,10 @@
-"""Energy of a stage whose fields are stiff: none comes from nowhere.
+"""Energy budget of a stage with stiff fields: the stage may create none.
 
 An implicit step (`implicit_loads`) keeps the energy of a linear spring. Where springs have a rest length, act beside
-the centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is held to what was there
-before, what the held loads did on the way, and what fields without an energy gave: pushes, the wind. What is too much
-is taken from the motion. Where the motion has not as much the way was too far up a potential: the body stays where it
-was.
+the centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is limited to the energy
+before, plus the work of the held loads, plus the work of fields without an energy: pushes, the wind. The excess is
+taken from the motion. If the motion has less than that, the body went too far up a potential, and is put back to its
+place.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ def _middle(y, end):
 
 @inlined
 def constant_loads(work):
-    """Acceleration and torque that are held over the step."""
+    """Acceleration and torque held over the step."""
     a, T = work.held_acceleration, work.held_torque
     return (a[0], a[1], a[2]), (T[0], T[1], T[2])
 
 
 @kernel
 def energy_gain(y, end, h, offset_frame, work):
-    """(energy that a stage from y to `end` has gained from nowhere, its kinetic energy, rounding of both) [J]."""
+    """(energy created by a stage from y to `end`, its kinetic energy, rounding of both) [J]."""
     x, q, v, L = _middle(y, end)
     before, after = (
         kinetic_energy(y[1], y[2], y[3], work, offset_frame),
@@ -71,7 +71,7 @@ def energy_gain(y, end, h, offset_frame, work):
 
 @if_declared(False)
 def has_work_error(y, end, h, offset_frame, work):
-    """True where the work from y to `end` of explicit loads misses the change of the fields' energy."""
+    """True if the work of explicit loads from y to `end` misses the change of the fields' energy."""
     x, q, v, L = _middle(y, end)
     t = work.now + 0.5 * h
     state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, offset_frame, work)
@@ -90,10 +90,10 @@ def _as_it_is(y, end, h, is_free, offset_frame, work):
 
 @if_declared(_as_it_is)
 def limit_energy_gain(y, end, h, is_free, offset_frame, work):
-    """`end` of a stage of length h from y without the energy that came from nowhere.
+    """State `end` of a stage of length h from y, without the energy that the stage created.
 
-    Where there is too little motion to pay with the body is back at y: in free flight (`is_free`) turned round, in
-    contact without velocity.
+    If the motion is too small for the excess, the body is back at y: reversed in free flight (`is_free`), without
+    velocity in contact.
     """
     if work.is_stiff == 0:
         return end

@@ -1,4 +1,4 @@
-"""Loads of all fields at a state, and how they are put beside what is held over the step."""
+"""Loads of all fields at a state, added to the loads that are held over the step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def field_state(x, q, v, L, t, offset_frame, work):
 
 @inlined
 def kicked_state(x, q, v, L, loads, kick, later, offset_frame, work):
-    """State that fields are told, `later` [s] than now, once loads (F, T) and those held have acted for `kick` [s]."""
+    """State for the fields, `later` [s] than now, after loads (F, T) and the held ones have acted for `kick` [s]."""
     a, torque = add_held_loads(loads[0], loads[1], work)
     return field_state(
         x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), work.now + later, offset_frame, work
@@ -45,7 +45,7 @@ def field_load(x, q, v, L, t, offset_frame, work):
 
 @inlined
 def apply_loads(force, torque, work):
-    """Let them act, besides what is held; `work.acceleration` bounds what they do to any point of the body."""
+    """Let loads act beside the held ones; `work.acceleration` bounds the acceleration of any point of the body."""
     inv_mass, J = 1.0 / work.mass, work.J
     for c in range(3):
         work.free_acceleration[c] = work.held_acceleration[c] + inv_mass * force[c]
@@ -64,13 +64,13 @@ def principal_axes_matrix(q, offset_frame, work):
 
 @inlined
 def add_held_loads(F, T, work):
-    """Acceleration [m/s²] and torque [N m] of fields' loads and of what is held."""
+    """Acceleration [m/s²] and torque [N m] of fields' loads plus the held ones."""
     return plus(as_vector(work.held_acceleration), times(1.0 / work.mass, F)), plus(as_vector(work.held_torque), T)
 
 
 @inlined
 def apply_total_loads(loads, work):
-    """Let them act."""
+    """Let total loads act."""
     a, T = loads
     F = times(work.mass, minus(a, as_vector(work.held_acceleration)))
     apply_loads(F, minus(T, as_vector(work.held_torque)), work)
@@ -96,7 +96,7 @@ def acting_loads(work):
 
 @inlined
 def load_bound(loads, work):
-    """Bound of what an acceleration and a torque do to any point of the body [m/s²]."""
+    """Bound of the acceleration of any point of the body under an acceleration and a torque [m/s²]."""
     a, T = loads
     J = max(work.J[0], work.J[1], work.J[2])
     return math.sqrt(qt.dot(a, a)) + work.radius * J * math.sqrt(qt.dot(T, T))

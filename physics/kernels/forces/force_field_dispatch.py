@@ -1,4 +1,4 @@
-"""Fields that a kernel is compiled for, read off the *type* of the workspace.
+"""Dispatch to the fields that a kernel is compiled for, by the *type* of the workspace.
 
 A scene's fields are members of its workspace record: one marker per kind of field, `load_drag_1x3` for one `Drag` of
 three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
@@ -64,7 +64,7 @@ _KNOWN: dict[str, Term] = {}
 
 
 def register_terms(terms: tuple[Term, ...]) -> None:
-    """Make terms known before a kernel is compiled for a workspace that holds their markers."""
+    """Register terms before a kernel is compiled for a workspace that holds their markers."""
     _KNOWN.update((term.marker, term) for term in terms)
 
 
@@ -99,7 +99,7 @@ def _markers(names) -> list[str]:
 
 
 def if_declared(otherwise=None):
-    """Make a function, whose last argument is the workspace, a kernel that only returns `otherwise` without fields.
+    """Make a kernel of a function whose last argument is the workspace; without fields it only returns `otherwise`.
 
     A function for `otherwise` is called instead. That is inlined: nothing is left of it.
     """
@@ -107,7 +107,7 @@ def if_declared(otherwise=None):
 
 
 def if_user_field(otherwise=None):
-    """As `if_declared`, where some field does not tell its rates: a user's own."""
+    """Make a kernel like `if_declared`, for scenes with a user's field, which does not tell its rates."""
     return when(lambda *types: _has_unknown(members(types[-1])), otherwise)
 
 
@@ -127,7 +127,7 @@ def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
 
 
 def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
-    """A kernel (state, t, work) that adds up what the chosen functions of a workspace's fields give."""
+    """Make a kernel (state, t, work) that adds up chosen functions of a workspace's fields."""
 
     def total(state, t, work):
         result = start
@@ -148,7 +148,7 @@ def _no_air(state, t, work):
 
 
 def _of_middle(function):
-    """A field's function of the three states of a stage that looks at the middle one."""
+    """Adapter of a field's function to the middle one of a stage's three states."""
 
     def load(states, p, t):
         return function(states[0], p, t)
@@ -216,7 +216,7 @@ total_user_load = _sum(LOAD, _no_load, lambda term: term.function if term.rates 
 
 
 def _mean_load(states, t, work):
-    """Load of all fields over a stage, `states` in its middle, at its start and at its end: of discrete gradients."""
+    """Mean load of all fields over a stage, by discrete gradients, from `states` at its middle, start and end."""
     result = _no_load
     for term, first, last in iterate_terms(work, LOAD):
         mean = runtime_kernel(_of_middle(term.function)) if term.mean is None else term.mean
@@ -239,7 +239,7 @@ def _then_soften(before, function, first, last):
 
 
 def _softened(loads, h, R, state, work):
-    """Acceleration and torque as the implicit step over h of all fields has them, one field after the other."""
+    """Acceleration and torque softened by the implicit step over h, one field after the other."""
     result = _as_it_is
     for term, first, last in iterate_terms(work, LOAD):
         if term.soften is not None:

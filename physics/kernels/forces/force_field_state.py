@@ -1,4 +1,4 @@
-"""State of a body as force fields read it, and the vector algebra that fields need."""
+"""State of a body for force fields, and their vector algebra."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class FieldState(NamedTuple):
-    """A body at a moment; world frame unless it says otherwise.
+    """A body at a moment; all vectors are in the world frame unless stated otherwise.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Acceleration and torque of a step with fields in it: what is held, and the fields where the step needs them.
+"""Acceleration and torque of a step with fields: loads that are held, and when fields are evaluated.
 
 Without fields `work.free_acceleration` and `work.torque` are what gravity and the wrench make them, for the whole
 call. With fields they are set anew:
@@ -46,7 +46,7 @@ EXPLICIT_TURN = 1.0e-4
 
 @if_declared()
 def bind_fields(params, i, scheme, work):
-    """Take the fields' parameters of body i, and what the step holds, into `work`.
+    """Store the fields' parameters of body i, and the step's held loads, in `work`.
 
     A textbook scheme (`scheme` not None) keeps its explicit loads at any step: it is there to show what they do.
     """
@@ -61,13 +61,13 @@ def bind_fields(params, i, scheme, work):
 
 @if_declared()
 def set_clock(elapsed, work):
-    """Say that so much time has passed since the start of the call [s]."""
+    """Set the time since the start of the call [s]."""
     work.now = work.call_start + elapsed
 
 
 @if_declared()
 def advance_clock(h, work):
-    """Say that so much time has passed since it was last said [s]."""
+    """Advance the time since the start of the call by [s]."""
     work.now += h
 
 
@@ -127,11 +127,10 @@ def hold_contact_loads(y, h, gyroscopic, offset_frame, work):
 
 @if_declared(False)
 def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
-    """Hold the loads of the middle of a stage in contact from y to `end`: whether they are others than before.
+    """Hold the loads of the middle of a stage in contact from y to `end`; return whether they have changed.
 
-    Contacts may have made motion that the start of the stage did not have, so it is looked at anew whether it is stiff.
-    Where it is, the change is softened: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion
-    agree, if the contacts push as they did.
+    Contacts may have changed the motion, so stiffness is tested again. In a stiff stage the change is softened: with A'
+    = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion agree, if the contacts push as before.
     """
     x, q, v, L = y
     half = 0.5 * h
@@ -161,7 +160,7 @@ def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
 
 @if_declared()
 def hold_softened_loads(y, h, gyroscopic, offset_frame, work):
-    """Hold the loads of an implicit step over h from y, whatever touches."""
+    """Hold the loads of an implicit step over h from y, with or without contact."""
     x, q, v, L = y
     half = 0.5 * h
     t = work.now + half
@@ -191,24 +190,24 @@ def has_fields(work):
 
 @if_declared(0.0)
 def time_now(work):
-    """The time now [s]."""
+    """Present time [s]."""
     return work.now
 
 
 @if_declared(0.0)
 def reset_felt_flag(work):
-    """Forget what was felt; the time now [s]."""
+    """Clear the flag of `has_felt_field`; return the present time [s]."""
     work.is_felt = 0
     return work.now
 
 
 @if_declared()
 def set_now(t, work):
-    """Say what time it is [s]."""
+    """Set the present time [s]."""
     work.now = t
 
 
 @if_declared(True)
 def has_felt_field(work):
-    """True if a field, or a held torque, was not zero anywhere since `reset_felt_flag`."""
+    """True if a field, or a held torque, was nonzero anywhere since `reset_felt_flag`."""
     return work.is_felt == 1

@@ -1,4 +1,4 @@
-"""Implicit loads: what a field gives over a step that is too long for the explicit midpoint rule.
+"""Implicit loads of fields, for a step that is too long for the explicit midpoint rule.
 
 With the loads A = (a, T) of the middle, z = (v, ω) and the generalised mass M, the linearly implicit midpoint rule is
 
@@ -48,7 +48,7 @@ def implicit_share(z):
 
 @inlined
 def is_unresolved(rates, h):
-    """True where a step of h does not resolve how a field swings or turns; `stiff_flight` resolves damping."""
+    """True if a step of h does not resolve the swing or turn of a field; `stiff_flight` resolves damping."""
     return h * h * rates[1] > _RESOLVED_ANGLE * _RESOLVED_ANGLE or h * rates[2] > _RESOLVED_ANGLE
 
 
@@ -60,26 +60,26 @@ def is_too_stiff(rates, h):
 
 @inlined
 def mobility_bound(arm, mass, J):
-    """Bound of the inverse mass that a point of the body shows to a force [1/kg]."""
+    """Bound of the inverse mass of any point of the body under a force [1/kg]."""
     return 1.0 / mass + qt.dot(arm, arm) * max(J[0], J[1], J[2])
 
 
 @inlined
 def arm_frequency_squared(force, arm, J):
-    """Squared frequency [1/s²] at which a force at an arm swings the body: like a pendulum, |F| |r| J at most."""
+    """Squared frequency [1/s²] of the swing of a body under a force at an arm: a pendulum's, |F| |r| J at most."""
     return math.sqrt(qt.dot(force, force) * qt.dot(arm, arm)) * max(J[0], J[1], J[2])
 
 
 @inlined
 def soften_torque(T, s, R, J):
-    """(1 + s I⁻¹)⁻¹ T for a stiffness against turning, the same about all axes: s of Z [kg m²]."""
+    """(1 + s I⁻¹)⁻¹ T for a stiffness s of Z [kg m²] against turning, equal about all axes."""
     m = qt.transposed_matvec(R, T)
     return qt.matvec(R, (m[0] / (1.0 + s * J[0]), m[1] / (1.0 + s * J[1]), m[2] / (1.0 + s * J[2])))
 
 
 @inlined
 def soften_arm(loads, h, force, arm, R, J):
-    """Loads with the torque softened as a force at an arm asks for."""
+    """Loads with the torque softened for the swing of a force at an arm."""
     a, T = loads
     return a, soften_torque(T, 0.25 * h * h * math.sqrt(qt.dot(force, force) * qt.dot(arm, arm)), R, J)
 
@@ -107,9 +107,9 @@ def point_mobility(direction, arm, R, mass, J):
 def implicit_point_force(w, n, s, t, wn, ws, wt, along, across):
     """Force f = (1 + Z W)⁻¹ Z w for the acceleration w of a point, or of two against each other.
 
-    Z has `along` the unit vector n and `across` it, along s and t [kg]; wn, ws, wt are W n, W s and W t, with the
-    mobility W of the point or of both [1/kg]. In these axes row i reads f_i + z_i (W f)_i = z_i w_i; divided by
-    1 + z_i W_ii it is as good for any z.
+    Z has the stiffness `along` on the unit vector n, and `across` on s and t [kg]. wn, ws, wt are W n, W s and W t,
+    with the mobility W of the point or of both [1/kg]. In these axes row i reads f_i + z_i (W f)_i = z_i w_i. Each row
+    is divided by 1 + z_i W_ii, which keeps the system accurate for any z.
     """
     kn = along / (1.0 + along * qt.dot(n, wn))
     ks = across / (1.0 + across * qt.dot(s, ws))

@@ -1,4 +1,4 @@
-"""Springs between bodies that a step does not resolve: implicit loads of both ends at once (`implicit_loads`).
+"""Implicit loads of both ends at once of springs between bodies that a step does not resolve (`implicit_loads`).
 
 Also where the columns of such a spring stand, and the state of a body in the middle of a stage.
 """
@@ -41,7 +41,7 @@ def read_middle(body):
 
 @inlined
 def write_middle(body, y):
-    """Write it."""
+    """Write (x, q, v, L) of a body in the middle of the stage."""
     x, q, v, L = y
     m = body.middle
     m[0], m[1], m[2] = x
@@ -52,7 +52,7 @@ def write_middle(body, y):
 
 @inlined
 def middle_field_state(body, later, offset_frame):
-    """State that the fields of a body are told in its middle."""
+    """State for the fields of a body in its middle."""
     x, q, v, L = read_middle(body)
     return field_state(x, q, v, L, body.now + later, offset_frame, body)
 
@@ -65,7 +65,7 @@ def _principal(body, offset_frame):
 
 @inlined
 def _own_loads(body, h, offset_frame):
-    """Loads of a body that the implicit step over h of its own fields has, as if no spring tied it to others."""
+    """Loads of a body by the implicit step over h of its own fields, without springs to other bodies."""
     state = middle_field_state(body, 0.5 * h, offset_frame)
     F, T = total_own_load(state, body.now + 0.5 * h, body)
     return soften_loads(add_held_loads(F, T, body), h, _principal(body, offset_frame), state, body)
@@ -73,7 +73,7 @@ def _own_loads(body, h, offset_frame):
 
 @inlined
 def _hold_unsoftened_springs(body, h, offset_frame):
-    """Let the springs to others act besides the body's own softened loads."""
+    """Add the loads of springs to other bodies to the body's own softened loads."""
     F, T = total_linked_load(middle_field_state(body, 0.5 * h, offset_frame), body.now + 0.5 * h, body)
     a, torque = _own_loads(body, h, offset_frame)
     apply_total_loads((plus(a, times(1.0 / body.mass, F)), plus(torque, T)), body)
@@ -81,7 +81,7 @@ def _hold_unsoftened_springs(body, h, offset_frame):
 
 @inlined
 def _soften_springs(body, h, offset_frame):
-    """Soften by the body's own fields what springs to others, themselves softened by now, add to its own loads."""
+    """Soften, by the body's own fields, the loads that already softened springs add to its own loads."""
     own = _own_loads(body, h, offset_frame)
     added, state = subtract_loads(acting_loads(body), own), middle_field_state(body, 0.5 * h, offset_frame)
     apply_total_loads(add_loads(own, soften_loads(added, h, _principal(body, offset_frame), state, body)), body)
@@ -116,10 +116,10 @@ def _soften_pair(k, one, other, h, offset_frame):
 
 @inlined
 def hold_implicit_loads(first, count, h, offset_frame, bodies):
-    """Let loads act as the implicit step over h has them: own fields, then springs between bodies, one after another.
+    """Let loads act by the implicit step over h: own fields, then springs between bodies, one after another.
 
-    A field softens the loads of a spring after the spring has: of loads that a damper makes small, even a small share
-    that is left to one of the two bodies would be large.
+    A field softens the loads of a spring after the spring itself has. A damper leaves little of its load, so even a
+    small share taken from one of the two bodies before that would be large.
     """
     for b in range(bodies.shape[0]):
         _hold_unsoftened_springs(bodies[b], h, offset_frame)
@@ -134,7 +134,7 @@ def hold_implicit_loads(first, count, h, offset_frame, bodies):
 
 @kernel
 def note_world_rates(h, offset_frame, bodies):
-    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for one of them."""
+    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for any of them."""
     stiff = 0
     for b in range(bodies.shape[0]):
         body, state = bodies[b], middle_field_state(bodies[b], 0.5 * h, offset_frame)

@@ -1,4 +1,4 @@
-"""Magnus lift: the force across the velocity of a body that spins.
+"""Magnus lift: the force on a spinning body, perpendicular to its velocity.
 
     F = ½ ρ C π r³ ω x u,    u = velocity relative to the air,  r = (d1 d2 d3)^(1/3)
 
@@ -49,7 +49,7 @@ def magnus_rates(state, p, J, h):
 
 @inlined
 def soften_magnus(loads, h, R, state, p, J):
-    """Loads as the implicit midpoint rule has them, which keeps the speed: x of x - b x x = a, b half the turn of h."""
+    """Loads by the implicit midpoint rule, which keeps the speed: solve x - b x x = a, b half the turn in h."""
     a, T = loads
     b = times(0.5 * h, _turning(state, p))
     x = plus(a, plus(qt.cross(b, a), times(qt.dot(b, a), b)))

@@ -1,4 +1,4 @@
-"""Resolution of the fields by a stage: by the rates that built-in ones tell, and by how the loads of others change."""
+"""Resolution of the fields by a stage: built-in fields tell their rates, others show it by changes of loads."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _LOAD_ROUNDING = 1.0e-9
 
 @kernel
 def note_field_rates(state, late, h, work):
-    """Note whether a stage of length h is too long for the explicit midpoint rule, and for the fields at all.
+    """Note whether a stage of length h is too long for the explicit midpoint rule, and for resolving the fields.
 
     `state` and `late` are at the same place, with the velocities of the stage's start and those that its loads lead to:
     between them damping may grow, and a body reach a surface.
@@ -57,7 +57,7 @@ def note_field_rates(state, late, h, work):
 
 @inlined
 def _change_of(first, second, work):
-    """Change between two loads (F, T): acceleration and torque, and the bound of what it does to any point [m/s²]."""
+    """Change between two loads (F, T): acceleration, torque, and a bound of any point's acceleration by it [m/s²]."""
     F, T = minus(second[0], first[0]), minus(second[1], first[1])
     change = times(1.0 / work.mass, F), T
     return change, load_bound(change, work)
@@ -75,7 +75,7 @@ def _change_by_kick(kick, moved, v, L, place, work):
 
 @inlined
 def _is_too_much(change, size, cause, cause_size, work):
-    """True where a change of loads is more of its cause than the explicit rule bears; more where it opposes that."""
+    """True if a change of loads is too large for the explicit rule; a change that opposes its cause may be larger."""
     arm = work.radius * max(work.J[0], work.J[1], work.J[2])
     product = qt.dot(cause[0], change[0]) + arm * arm * qt.dot(cause[1], change[1])
     return size > (cause_size if product <= -0.5 * size * cause_size else _TURNING_SHARE * cause_size)
@@ -129,12 +129,12 @@ def newton_load_change(y, end, loads, h, gyroscopic, offset_frame, work):
 
 @if_declared(False)
 def is_stiff(work):
-    """True where the held loads are those of an implicit step."""
+    """True if the held loads are those of an implicit step."""
     return work.is_stiff == 1
 
 
 @if_declared()
 def report_unresolved_body(is_moved, report, work):
-    """Count a body that has moved in fields which some stage of the call did not resolve, or was put back by one."""
+    """Count a body that moved while some stage of the call did not resolve its fields, or that a stage put back."""
     if work.is_put_back == 1 or (work.is_coarse == 1 and is_moved):
         report[work.world, at.UNRESOLVED_MOTION] += 1.0

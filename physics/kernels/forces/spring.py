@@ -51,7 +51,7 @@ def spring_vector(state, p):
 
 @inlined
 def spring_damper_load(arm, e, l, u, p):
-    """(force, torque) at a point of velocity u, on a line along e whose length is l."""
+    """(force, torque) at a point with velocity u, on a line along e of length l."""
     if l == 0.0:
         return acting_at(arm, times(-p[SPRING_DAMPING], u))
     s = p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) + p[SPRING_DAMPING] * qt.dot(u, e) / l
@@ -78,8 +78,9 @@ def spring_energy(state, p, t):
 def mean_spring(states, p, t):
     """(force, torque) of a spring between two states: the discrete gradient of its energy (Gonzalez 1996).
 
-    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does just what the
-    energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² - l_0².
+    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does exactly the
+    work that the energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² -
+    l_0².
     """
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
@@ -103,10 +104,10 @@ def spring_rates(state, p, J, h):
 
 @inlined
 def implicit_spring_stiffness(h, w, e, l, p):
-    """Direction of a spring, and Z of `implicit_loads` along it and across [kg]; w the mobility of its points [1/kg].
+    """Direction of a spring, and Z of `implicit_loads` along and across it [kg]; w is its points' mobility [1/kg].
 
-    Across the line it is as stiff as it is tight, k (1 - l0/l); a spring that pushes would push over, which is left
-    out.
+    Across the line the stiffness is that of its tension, k (1 - l0/l). A compressed spring would have a negative one,
+    which is left out.
     """
     spring, damper = (
         0.25 * h * h * p[SPRING_STIFFNESS],
@@ -119,7 +120,7 @@ def implicit_spring_stiffness(h, w, e, l, p):
 
 @inlined
 def soften_spring(loads, h, R, state, p, J):
-    """Loads as `implicit_loads` has them."""
+    """Softened loads of `implicit_loads`."""
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return loads
     arm, e, l = spring_vector(state, p)
@@ -156,7 +157,7 @@ def push_rates(state, p, J, h):
 
 @inlined
 def soften_push(loads, h, R, state, p, J):
-    """Loads as `implicit_loads` has them."""
+    """Softened loads of `implicit_loads`."""
     if p[PUSH_IS_BODY_FIXED] != 0.0:
         return loads
     force, point = (

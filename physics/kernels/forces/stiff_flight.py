@@ -1,9 +1,9 @@
 """Flight in fields that are stiff: a step cut into parts that begin short and grow.
 
-What damping does to a velocity is over after a few times 1/λ, and then λ may still be as large: of a linear drag it
-is. So the first part is a share of 1/λ, and each next one is longer than the one before by a constant factor: local
-errors are a share of what is left of the velocity, which falls faster. λ h = 10¹² takes 72 parts; the last one that
-there may be takes all that is left, by an implicit step, when nothing is left to err about.
+Damping changes a velocity during a few times 1/λ, and λ may stay as large afterwards, as it does for linear drag. So
+the first part is a share of 1/λ, and each next one is longer by a constant factor. Local errors are a share of the
+remaining velocity, which falls faster than parts grow. λ h = 10¹² takes 72 parts. The last allowed part takes the rest
+of the step, by an implicit step, when the velocity is negligible.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _NEARLY_CONVERGED = 1.0e-3
 
 @kernel
 def implicit_flight(y, h, flight, work):
-    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from those held.
+    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from held loads.
 
-    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). Where that does not settle the loads of the first step are kept.
+    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). If the iteration does not settle, the loads of the first step are kept.
     """
     start = acting_loads(work)
     size, loads = load_bound(start, work), start
@@ -55,7 +55,7 @@ def _as_it_is(end, y, h, flight, work):
 
 @if_declared(_as_it_is)
 def subdivide_stiff_flight(end, y, h, flight, work):
-    """`end` of a flight over h from y under the loads that are held; where these are stiff, made in parts."""
+    """State `end` of a flight over h from y under held loads; stiff flights are made in parts."""
     if work.is_stiff == 0:
         return end
     start, left, part = time_now(work), h, 0.0

@@ -1,4 +1,4 @@
-"""Spring and damper between two bodies: to each of them a spring to an anchor that moves with the other.
+"""Spring and damper between two bodies: for each body a spring to an anchor that moves with the other.
 
 The point of the other body and its velocity are numbers among the spring's columns, written (`place_anchors`) before
 the loads of either body are evaluated. Both ends see the same two points and velocities, so that their forces are
@@ -63,7 +63,7 @@ def linked_spring_rates(state, p, J, h):
 
 @inlined
 def soften_linked_arm(loads, h, R, state, p, J):
-    """Torque as `implicit_loads` has it under the force at its arm; the rest is done for both ends at once."""
+    """Torque of `implicit_loads` under the force at its arm; the other loads are softened for both ends at once."""
     if p[LINK_OTHER] < 0.0:
         return loads
     force, _ = linked_spring(state, p, 0.0)
@@ -73,7 +73,7 @@ def soften_linked_arm(loads, h, R, state, p, J):
 
 @inlined
 def linked_spring_energy(state, p, t):
-    """Half of ½ k (l - l0)² [J]: the other half is the other body's."""
+    """Half of ½ k (l - l0)² [J]; the other body has the other half."""
     if p[LINK_OTHER] < 0.0:
         return 0.0
     _, _, l = spring_vector(state, p)
@@ -81,12 +81,12 @@ def linked_spring_energy(state, p, t):
 
 
 def _first_columns(record) -> list[int]:
-    """First column of each spring between bodies in a record of a body, or in the type of one."""
+    """First column of each spring between bodies in a body's record, or in the type of one."""
     return [first for term, first, _ in iterate_terms(record, LOAD) if term.function is linked_spring]
 
 
 def _if_linked(where, otherwise):
-    """Make a function a kernel that is told first column and number of the springs, else returns `otherwise`.
+    """Make a kernel of a function of the springs' first column and number; without springs it returns `otherwise`.
 
     `where` gives the record of a body, or its type, from the function's arguments.
     """
@@ -114,7 +114,7 @@ def _record(bodies):
 
 @inlined
 def _put_anchor(first, columns, x, R, v, w, mobility):
-    """Write point, velocity and mobility of the other body, whose state this is, into the columns of a spring."""
+    """Write point, velocity and mobility of the other body, in the given state, into the columns of a spring."""
     o = first + LINK_OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
@@ -126,7 +126,7 @@ def _put_anchor(first, columns, x, R, v, w, mobility):
 
 @inlined
 def _put_anchors(first, count, offset_frame, records):
-    """Put the anchors of all springs where the bodies' `read_middle` says."""
+    """Place the anchors of all springs by the bodies' `read_middle`."""
     for b in range(records.shape[0]):
         columns = records[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
@@ -141,7 +141,7 @@ def _put_anchors(first, count, offset_frame, records):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
 def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
-    """`held_loads.hold_loads` for bodies tied by springs: all at once. False, and nothing done, without those.
+    """Do `held_loads.hold_loads` for bodies tied by springs, all at once. False, and no change, without springs.
 
     A body in contact keeps the velocities of the start of the stage, as in `held_loads.hold_contact_loads`.
     """
@@ -167,13 +167,13 @@ def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, offset_frame, bodies):
-    """Put the anchors of all springs where the bodies' `read_middle` says."""
+    """Place the anchors of all springs by the bodies' `read_middle`."""
     _put_anchors(first, count, offset_frame, bodies.work)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors_now(first, count, offset_frame, bodies):
-    """Put the anchors of all springs where the bodies are now."""
+    """Place the anchors of all springs at the bodies' present states."""
     for b in range(bodies.work.shape[0]):
         write_middle(bodies.work[b], read_state(bodies.state, b))
     _put_anchors(first, count, offset_frame, bodies.work)
@@ -181,7 +181,7 @@ def place_anchors_now(first, count, offset_frame, bodies):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def unite_linked_bodies(first, count, parent, bodies):
-    """Make one island of any two bodies that a spring ties together, in what leads to the first body of each."""
+    """Join the islands of bodies tied by a spring, in the table from each body to the first of its island."""
     for b in range(bodies.work.shape[0]):
         columns = bodies.work[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
@@ -202,7 +202,7 @@ def _kick(body, half, offset_frame):
 
 @_if_linked(lambda arguments: arguments[-1], None)
 def place_anchors_of_body(first, count, i, state, bodies, work):
-    """Put the anchors of body i's springs where the other bodies of its world are now."""
+    """Place the anchors of body i's springs at the present states of the other bodies of its world."""
     for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
         if work.columns[k + LINK_OTHER] >= 0.0:
             j = i - i % bodies + int(work.columns[k + LINK_OTHER])

@@ -1,7 +1,7 @@
-"""`energy_budget` for worlds of many bodies: the energy of a stiff stage is that of all of them together.
+"""`energy_budget` for worlds of many bodies: a stiff stage has one energy, that of all bodies together.
 
-Springs carry energy from body to body, and so does contact. What is too much is taken from the motion of all bodies:
-where nothing but each other holds them, from that against their common centre, so that they keep their momentum.
+Springs carry energy from body to body, and so does contact. The excess is taken from the motion of all bodies: where
+nothing but each other holds them, from that against their common centre, so that they keep their momentum.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _any_is_stiff(records):
 
 @kernel
 def _potential(later, offset_frame, bodies):
-    """Energy of all fields at the places of now, `later` [s] than the start of the stage [J]."""
+    """Energy of all fields at the present places, `later` [s] than the start of the stage [J]."""
     place_anchors_now(offset_frame, bodies)
     total = 0.0
     for b in range(bodies.work.shape[0]):
@@ -66,7 +66,7 @@ def note_stage_energy(offset_frame, bodies, first):
 
 @kernel
 def _gain_of(b, h, offset_frame, bodies):
-    """(kinetic energy gained by body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
+    """(kinetic energy of body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
     body, y, end = bodies.work[b], _start(bodies.work[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = (
@@ -82,7 +82,7 @@ def _gain_of(b, h, offset_frame, bodies):
 
 @inlined
 def _common_velocities(ties, bodies):
-    """Velocity of the common centre of mass now and at the start of the stage; zero where walls hold the bodies."""
+    """Velocity of the common centre of mass, now and at the start of the stage; zero if walls hold the bodies."""
     mass, p, start = 0.0, ZERO, ZERO
     for b in range(bodies.work.shape[0]):
         m = bodies.work[b].mass
@@ -95,9 +95,9 @@ def _common_velocities(ties, bodies):
 
 @kernel
 def _take(gain, ties, offset_frame, bodies):
-    """Take an energy from the motion of all bodies; where there is too little, they are back where they were.
+    """Take an energy from the motion of all bodies; where there is too little, restore the start of the stage.
 
-    Their common velocity then is that of the start, too: what the stage made of it is as wrong as the rest.
+    Their common velocity is then reset to that of the start, too: the stage's result for it is as wrong as the rest.
     """
     c, start = _common_velocities(ties, bodies)
     motion = 0.0
@@ -119,9 +119,9 @@ def _take(gain, ties, offset_frame, bodies):
 
 @if_declared()
 def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
-    """Take from the bodies what energy a stiff stage of length h gave them from nowhere.
+    """Take the energy that a stiff stage of length h created from the bodies.
 
-    `ties` is 1 where nothing but each other holds them; `first` the first body's record.
+    `ties` is 1 for bodies that are held by each other only; `first` is the first body's record.
     """
     if not _any_is_stiff(bodies.work):
         return
@@ -136,7 +136,7 @@ def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
 
 @if_declared()
 def report_unresolved_bodies(report, bodies, first):
-    """Count the bodies that move in fields which some stage of the call did not resolve."""
+    """Count the bodies that moved while some stage of the call did not resolve their fields."""
     for b in range(bodies.work.shape[0]):
         _, _, v, L = read_state(bodies.state, b)
         report_unresolved_body(v != ZERO or L != ZERO, report, bodies.work[b])

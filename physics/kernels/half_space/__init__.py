@@ -1,1 +1,1 @@
-"""Bodies at walls: support functions, contact points, gaps, and how long a flight is sure to stay clear."""
+"""Bodies at walls: support functions, contact points, gaps, and times of flight without contact."""

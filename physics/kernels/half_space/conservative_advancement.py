@@ -1,4 +1,4 @@
-"""Bodies that turn far in a step: how long their free flight is sure to stay clear of a wall.
+"""Safe times of free flight near a wall for bodies that turn far in a step.
 
 A feature that turns by a large angle may pass through a wall and be out of it again at the end of a stage, so that a
 look at the end is not enough. All points r of a body have
@@ -64,9 +64,9 @@ def is_centred(offset_frame, work):
 
 @inlined
 def may_turn(L, h, least, offset_frame, work):
-    """True if a body of angular momentum L could turn by more than `least` [rad] in h: a cheap, safe bound.
+    """True if a body of angular momentum L may turn by more than `least` [rad] in h: a cheap, safe bound.
 
-    A sphere does not where its centre is its centre of mass.
+    A sphere whose centre is its centre of mass never counts as turning.
     """
     if work.shape == SPHERE and is_centred(offset_frame, work):
         return False
@@ -97,7 +97,7 @@ def _arm(i, offset_frame, work):
 
 @kernel
 def turning_acceleration_bound(spin, q, L, h, offset_frame, work):
-    """Bound of what turning accelerates points by within h [m/s²], `spin` that of |ω|; 0 of a centred sphere."""
+    """Bound of the acceleration of points by turning within h [m/s²], from the bound `spin` of |ω|; 0 if centred."""
     if work.shape == SPHERE and is_centred(offset_frame, work):
         return 0.0
     torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
@@ -147,13 +147,13 @@ def secant_root(low, at_low, high, at_high):
 
 @inlined
 def mean_time(low, high):
-    """Between low and high > low >= 0, so that few halvings find a time of any size."""
+    """Time between low and high > low >= 0, chosen so that few halvings find a time of any size."""
     return math.sqrt(low * high) if high > 4.0 * low else 0.5 * (low + high)
 
 
 @inlined
 def _height(t, n, m, gap, rate, bend, c, R, work):
-    """Bound of the gap to a wall after t, see the module; c is the geometric centre from the centre of mass."""
+    """Bound of the gap to a wall after t, see the module; c is the geometric centre relative to the centre of mass."""
     k = turned_normal(n, m, t)
     dims = (work.dims[0], work.dims[1], work.dims[2])
     return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - support_of_vector(work.shape, dims, R, k)
@@ -161,7 +161,7 @@ def _height(t, n, m, gap, rate, bend, c, R, work):
 
 @kernel
 def safe_advance(y, wall, horizon, spin, offset_frame, work):
-    """(gap to a wall, a time within which it is not used up in free flight from y, at most `horizon`)."""
+    """(gap to a wall, time within which it cannot close in free flight from y, at most `horizon`)."""
     x, q, v, L = y
     n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, offset_frame)
     m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, WALL_OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
@@ -206,7 +206,7 @@ def may_reach_wall_in_flight(wall, y, h, work):
 
 @inlined
 def remove_symmetric_spin(R, w, work):
-    """Angular velocity without that about axes of symmetry of an ellipsoid, which sweeps nothing [rad/s]."""
+    """Angular velocity without the part about axes of symmetry of an ellipsoid, which moves no surface [rad/s]."""
     d = work.dims
     if work.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
         return w
@@ -219,7 +219,7 @@ def remove_symmetric_spin(R, w, work):
 
 @inlined
 def time_to_turn_far(n, y, offset_frame, work):
-    """Time in which a body turns by `FAR_TURN` about what is across n [s]: about n itself nothing comes nearer."""
+    """Time in which a body turns by `FAR_TURN` about axes across n [s]; turning about n brings no point nearer."""
     w = angular_velocity(y[1], y[3], work, offset_frame)
     if is_centred(offset_frame, work):
         w = remove_symmetric_spin(to_matrix(y[1]), w, work)
@@ -245,10 +245,10 @@ def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, work):
 
 @cold_kernel
 def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, work):
-    """Time, at most `left`, that a stage from y may take; less where the body turns far in h: no wall is passed [s].
+    """Time, at most `left`, that a stage from y may take, so that a body that turns far passes no wall [s].
 
-    In contact (n > 0) it does not fly as is foretold here: then it turns no further than a look at the end can tell. So
-    do features on a wall that others touch.
+    In contact (n > 0) the free flight of the bound does not apply; then the body turns at most as far as a test at the
+    end can judge. The same holds for features on a wall that others touch.
     """
     spin = spin_bound(y[1], y[3], h, offset_frame, work)
     if not spin * h > FAR_TURN:

@@ -12,13 +12,13 @@ from physics.kernels.state.layout import BLOCK, SPHERE, WALL_NORMAL, WALL_TANGEN
 
 @inlined
 def wall_of(slot, work):
-    """Wall of a contact: `features`, 8 or 1, is a power of two, and a step asks too often for a division each time."""
+    """Wall of a contact, by a shift: `features`, 8 or 1, is a power of two, and a division would be too slow."""
     return slot >> work.feature_bits
 
 
 @inlined
 def feature_of(slot, work):
-    """Feature of the body that touches there."""
+    """Feature of the body in a contact."""
     return slot & (work.features - 1)
 
 

@@ -1,4 +1,4 @@
-"""The contact set of one body: which features take part, and where they are."""
+"""Contact set of one body: the features that take part, and their gaps and speeds."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _stiffness = law_parameter(LAW_STIFFNESS)  # of contact that gives (`compliance`
 def is_flight_clear(x, v, h, work):
     """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
-    The gap of the sphere is a parabola in time; it is bounded below by its start plus what the velocity and
-    the acceleration can each take off. A contact could only matter when this is false.
+    The gap of the sphere is a parabola in time. Its lower bound is the start minus the largest losses by velocity and
+    by acceleration. A contact can matter only when this is false.
     """
     walls, a = work.walls, work.free_acceleration
     half = 0.5 * h * h
@@ -41,10 +41,10 @@ def is_flight_clear(x, v, h, work):
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """True if a feature belongs to the contact set of this stage.
 
-    It does when it touches (gap <= slop); when loads make it no faster at the wall than `soft`: than from rest in the
-    step, and than what rests as it is (`target_velocity.set_impact_targets`); and when loads can bring it to the wall
-    within the step, if it pushed in the last stage (`persistent_contacts`), or if this is the last one that the substep
-    may have.
+    A feature belongs to the set in three cases. It touches (gap <= slop). Or its speed at the wall is at most `soft`,
+    that of a fall from rest in the step, and of features at rest (`target_velocity.set_impact_targets`). Or loads can
+    bring it to the wall within the step, and it pushed in the last stage (`persistent_contacts`), or this is the last
+    stage that the substep may have.
     """
     if gap <= slop or (gap <= SIMULTANEOUS_SLOPS * slop and speed < 0.0):
         return True
@@ -55,7 +55,7 @@ def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
 
 @inlined
 def _admission_bounds(v, w, h, work):
-    """Bounds of `_admit`: the way that loads can make a feature go, the speed they can give it, and the largest gap."""
+    """Bounds of `_admit`: way and speed that loads can give a feature, and the largest gap."""
     slop, acceleration = work.slop, work.acceleration
     if _stiffness(work) > 0.0:  # springs push where there is no gap left
         acceleration = 0.0
@@ -86,7 +86,7 @@ def _write_vertices(d, vn, e, mb, work):
 
 @inlined
 def collect_wall_contacts(y, w, h, offset_frame, memory, work):
-    """Fill `work` (slot, gap, speed, mask, and of all together widest and approach) with the contact set at this pose.
+    """Fill `work` (slot, gap, speed, mask, and the maxima widest and approach) with the contact set at this pose.
 
     Parameters
     ----------
@@ -157,9 +157,9 @@ def _record(count, wall, feature, features, gap, speed, work):
 
 @inlined
 def check_penetration(x, R, offset_frame, work):
-    """Test for features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
+    """Find features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
-    Once a feature outside the set is, the other walls are not looked at: both are true then.
+    After a feature outside the set is found, the other walls are skipped: both results are true then.
     """
     walls, shape, least = work.walls, work.shape, -0.5 * work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -186,9 +186,9 @@ def check_penetration(x, R, offset_frame, work):
 
 @kernel
 def nearest_outside_set(x, R, offset_frame, work):
-    """Smallest gap [m] over all features that are not in the contact set, and the slot of its feature.
+    """Smallest gap [m] over all features outside the contact set, and the slot of its feature.
 
-    Of a wall that the bounding sphere does not reach the sphere's gap is taken: a lower bound, and positive (slot -1).
+    For a wall out of the bounding sphere's reach the sphere's gap is used: a lower bound, and positive (slot -1).
     """
     walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -230,7 +230,7 @@ def feature_gap(slot, x, R, offset_frame, work):
 
 @kernel
 def feature_gap_rate(slot, y, offset_frame, work):
-    """Rate of the gap of one feature [m/s]: its normal velocity. A point that wanders does so along the wall."""
+    """Rate of the gap of one feature [m/s]: its normal velocity. A wandering point wanders along the wall."""
     _, q, v, L = y
     walls, R, shape = work.walls, qt.to_matrix(q), work.shape
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -248,7 +248,7 @@ def feature_gap_rate(slot, y, offset_frame, work):
 
 @inlined
 def project_out_of_walls(x, R, offset_frame, work):
-    """Position moved along the normals so that nothing is deeper than the slop in a wall. No velocity changes."""
+    """Position moved along the normals until no point is deeper than the slop in a wall. No velocity changes."""
     walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
     dims = (work.dims[0], work.dims[1], work.dims[2])
     for k in range(walls.shape[0]):

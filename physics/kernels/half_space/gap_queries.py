@@ -1,4 +1,4 @@
-"""Looking at a state without advancing it: gaps, contact points, momenta in and out of the stored form."""
+"""Gaps and contact points of a state without a step, and conversion of momenta to and from the stored form."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def write_angular_momenta(rows, state, params):
 
 @entry_kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
-    """Smallest gap [m] of each given row over all walls, and the wall it is at (-1 without walls); not of hulls."""
+    """Smallest gap [m] of each given row over all walls, and its wall (-1 without walls); not of hulls."""
     for k in range(rows.shape[0]):
         i = rows[k]
         x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
@@ -83,6 +83,6 @@ def feature_point(state, params, shape, n, i, feature):
 
 @entry_kernel
 def contact_point(state, params, shapes, walls, i, wall, feature, out):
-    """`feature_point` the feature of row i towards a wall, into out (3,)."""
+    """Write `feature_point` of the feature of row i towards a wall into out (3,)."""
     n = (walls[wall, at.WALL_NORMAL], walls[wall, at.WALL_NORMAL + 1], walls[wall, at.WALL_NORMAL + 2])
     out[0], out[1], out[2] = feature_point(state, params, shapes[i % shapes.shape[0]], n, i, feature)

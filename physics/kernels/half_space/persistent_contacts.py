@@ -1,4 +1,4 @@
-"""Contacts that go on from one resting stage to the next.
+"""Contacts that continue from one resting stage to the next.
 
 A resting stage asks for no normal velocity at its end, and knows how its contacts turn until then to first order. It
 leaves of a stage of length h a normal speed of h² and a gap of h³, of either sign. These are errors of the scheme, no
@@ -23,13 +23,13 @@ WALL_MEMORY_HEAD = 3
 
 @inlined
 def last_normal_impulse(slot, memory, work):
-    """Normal impulse of a feature in the last stage of its body [N s]; 0 where that was in the air."""
+    """Normal impulse of a feature in the last stage of its body [N s]; 0 if that was in the air."""
     return memory[work.i, WALL_MEMORY_HEAD + work.slot.shape[0] + 3 * slot]
 
 
 @kernel
 def free_gap_acceleration(slot, y, offset_frame, work):
-    """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; < 0: it is pressed."""
+    """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; negative if it is pressed."""
     _, q, _, L = y
     n, a, torque = wall_normal(work.walls, wall_of(slot, work)), work.free_acceleration, work.torque
     dims = (work.dims[0], work.dims[1], work.dims[2])
@@ -65,9 +65,9 @@ def turning_acceleration(w, work):
 
 @kernel
 def is_persistent_contact(i, y, h, offset_frame, memory, work):
-    """True if the speed of contact i of the set is an error of the last stage: it pushed then, and is no faster.
+    """True if the speed of contact i is an error of the last stage: it pushed then, and is at most that fast.
 
-    A stage of length h can leave a contact that holds the speed that loads and turning make in it.
+    A stage of length h may leave a sticking contact with the speed that loads and turning give in h.
     """
     if not last_normal_impulse(work.slot[i], memory, work) > 0.0:
         return False
@@ -77,13 +77,14 @@ def is_persistent_contact(i, y, h, offset_frame, memory, work):
 
 @kernel
 def cancel_separation(y, h, offset_frame, memory, work):
-    """State with the one contact of the set at rest along its normal, and whether it was not.
+    """State with the one contact of the set at rest along its normal, and whether it has changed.
 
-    It is changed only where the contact holds on, but h would not bring it back.
+    The state changes only if the contact continues, but would not be brought back within h.
 
-    What leaves at u after a push p, though it is pressed against its wall still, got u/(n·W n) more than it should
-    have. A smaller push of the next stage makes up for that. Where u is more than the motion without a push turns
-    round within h, so much is taken back, at most p: both together push. `work.rebound` has what was.
+    A contact that leaves at u after a push p, though it is still pressed against its wall, got u/(n·W n) too much. A
+    smaller push of the next stage usually compensates for that. If u is more than the motion without a push can reverse
+    within h, this excess is taken back, at most p, so that both pushes together stay positive. `work.rebound` holds the
+    old impulse.
     """
     x, q, v, L = y
     gap, u, slot = work.gap[0], work.speed[0], work.slot[0]

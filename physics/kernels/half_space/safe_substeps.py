@@ -1,4 +1,4 @@
-"""Time for which a body in flight is sure to stay clear of every wall and needs no collision detection."""
+"""Time within which a body in flight cannot reach a wall and needs no collision detection."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _size(a):
 
 @inlined
 def count_clear_substeps(x, v, h, left, work):
-    """Number of substeps of h, of `left`, in which free flight from x with velocity v meets no wall; 0: it could.
+    """Number of substeps of h, of `left`, in which free flight from x with velocity v meets no wall; 0 if unknown.
 
     The first is `is_flight_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it
     is: with s and c the parts of velocity and acceleration towards a wall, its gap, and the bound for that at any time

@@ -1,4 +1,4 @@
-"""The Cholesky factor of the clamped rows and columns of a matrix, kept while indices come and go.
+"""Cholesky factor of the clamped rows and columns of a matrix, updated as indices are added and removed.
 
 `work` holds the factor in its first n rows and the matrix, with a diagonal scaled
 to [1/4, 1), in the next n. `index` holds the clamped indices in the order of the

@@ -63,7 +63,7 @@ def dantzig_sizes(n: int) -> tuple[tuple[int, int], int]:
 
 @kernel
 def scale_problem(M, q, work):
-    """Scaled matrix and q into `work`; returns the scales of M (0 if its diagonal is not >= 0) and q."""
+    """Write scaled matrix and q into `work`; return the scales of M (0 if its diagonal is not >= 0) and q."""
     n = q.shape[0]
     A, scale, rhs = work[n : 2 * n], work[2 * n + SCALE], work[2 * n + RHS]
     largest = 0.0
@@ -114,8 +114,8 @@ def find_rates(work, index, n, count, i):
 def find_block(work, index, z, n, i, largest, is_independent):
     """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks.
 
-    Where w_i is zero within rounding as well, i goes first, which ends the drive. The other
-    way round i would depend on the clamped ones, and rounding would decide what comes next.
+    If w_i is zero within rounding as well, i comes first, which ends the drive. Otherwise i would depend on the clamped
+    indices, and rounding would decide the next pivot.
     """
     w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
     threshold = DIRECTION_TOLERANCE * largest
@@ -179,7 +179,7 @@ def drive_to_zero(work, index, z, n, count, i, budget):
 
 @kernel
 def recompute(work, index, z, n, count):
-    """z of the clamped indices from the factor, refined once, the others 0; w = M z + q."""
+    """Recompute z of the clamped indices from the factor, refined once, others 0; and w = M z + q."""
     factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
     rhs, w, x = work[2 * n + RHS], work[2 * n + W], work[2 * n + SCRATCH]
     for k in range(n):
@@ -209,7 +209,7 @@ def recompute(work, index, z, n, count):
 
 @kernel
 def drive_all(work, index, z, n, max_pivots):
-    """Drive the first index with w < 0 until there is none. Returns (status, pivots)."""
+    """Drive the first index with w < 0 until none is left. Returns (status, pivots)."""
     count = 0
     pivots = 0
     while True:

@@ -82,7 +82,7 @@ def equilibrate(M, q, row_scale, column_scale):
 
 @kernel
 def fill_tableau(M, q, tableau, basis):
-    """Start: w basic, z and z0 nonbasic, rows w - M z - z0 = q. Returns the scale of q."""
+    """Fill the tableau of the start: w basic, z and z0 nonbasic, rows w - M z - z0 = q. Returns the scale of q."""
     n = q.shape[0]
     row_scale, column_scale = tableau[n], tableau[n + 1]
     q_scale = equilibrate(M, q, row_scale, column_scale)
@@ -121,7 +121,7 @@ def pivot_tableau(tableau, basis, n, r, c):
 
 @kernel
 def inverse_entry(tableau, basis, n, i, k):
-    """Entry (i, k) of the basis inverse: the column that belongs to w_k."""
+    """Entry (i, k) of the basis inverse: the column of w_k."""
     place = basis[2 * n + 1 + k]
     if place < 0:
         return tableau[i, -1 - place]
@@ -132,7 +132,7 @@ def inverse_entry(tableau, basis, n, i, k):
 
 @kernel
 def filter_tied_rows(tableau, basis, n, c, k, count):
-    """Keep those of the first `count` tied rows that have the least ratio in column k of [q | inverse].
+    """Keep those of the first `count` tied rows with the least ratio in column k of [q | inverse].
 
     k = -1 stands for the right-hand side. Returns how many are left.
     """
@@ -186,7 +186,7 @@ def find_leaving_row(tableau, basis, n, c):
 
 @kernel
 def find_first_row(tableau, n):
-    """The row in which z0 enters: least q; of tied ones the last, which is lexicographically least."""
+    """Row in which z0 enters: least q; of tied rows the last, which is lexicographically least."""
     r = 0
     for i in range(1, n):
         if tableau[i, n + 1] <= tableau[r, n + 1]:
@@ -196,7 +196,7 @@ def find_first_row(tableau, n):
 
 @kernel
 def refine_solution(M, q, z, tableau, basis, q_scale):
-    """Two steps of iterative refinement of the basic solution, then z in scaled units."""
+    """Take two steps of iterative refinement of the basic solution, then return z in scaled units."""
     n = q.shape[0]
     row_scale, column_scale, defect = tableau[n], tableau[n + 1], tableau[n + 2]
     for sweep in range(REFINEMENTS + 1):

@@ -1,4 +1,4 @@
-"""Statuses, exact scaling and the final check that the solvers of linear complementarity problems share.
+"""Statuses, exact scaling and final check, shared by the solvers of linear complementarity problems.
 
 Every solver scales its problem by powers of two first. That is exact in floating
 point, makes tolerances dimensionless, and lets units of any size stand side by side.

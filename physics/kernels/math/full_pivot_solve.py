@@ -66,10 +66,10 @@ def solve_full_pivot(m, A, order, x):
 
 @kernel
 def solve_least_norm(rows, m, A, x):
-    """The x of least norm with A[:rows, :m] x = A[:rows, m]; A is overwritten, a row that others imply is left out.
+    """Solution x of least norm of A[:rows, :m] x = A[:rows, m]; A is overwritten, dependent rows are left out.
 
-    Rows are made orthonormal one after the other (modified Gram-Schmidt), so that x, a sum of them, is smooth in A as
-    long as its rank is the same; what elimination sets to zero instead is up to rounding where pivots are equal.
+    Rows are made orthonormal one after the other (modified Gram-Schmidt). So x, a sum of rows, is smooth in A while the
+    rank stays the same. In an elimination rounding would choose the zero unknowns where pivots are equal.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numbers of up to four contacts as lanes; where there are fewer, those of the last one stand in what is left."""
+"""Gather numbers of up to four contacts into lanes; surplus lanes repeat the last contact."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def gather_component(values, k, n):
 
 @inlined
 def valid_lanes_mask(n):
-    """1 for each contact that there is, 0 for what is left."""
+    """1 for each lane with a contact of its own, 0 for surplus lanes."""
     return Lanes(1.0, 1.0 if n > 1 else 0.0, 1.0 if n > 2 else 0.0, 1.0 if n > 3 else 0.0)
 
 

@@ -19,6 +19,6 @@ def find_root(b, parent):
 
 @inlined
 def unite_sets(a, b, parent):
-    """Make one island of those of a and b."""
+    """Join the islands of a and b."""
     a, b = find_root(a, parent), find_root(b, parent)
     parent[max(a, b)] = min(a, b)

@@ -1,4 +1,4 @@
-"""Vectors as tuples of three numbers: sums, multiples, and reading them from arrays."""
+"""Vectors as tuples of three numbers: sums, multiples, and reads from arrays."""
 
 from __future__ import annotations
 

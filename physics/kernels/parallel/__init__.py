@@ -1,1 +1,1 @@
-"""Work shared by threads without Python's lock: atomics, work stealing, spinning workers."""
+"""Threads that share work without Python's lock: atomics, work stealing, spinning workers."""

@@ -14,7 +14,7 @@ else:
 
     @inlined
     def atomic_add(table, row, column, number):
-        """table[row, column] += number; returns what was there before."""
+        """table[row, column] += number; returns the old value."""
         before = table[row, column]
         table[row, column] = before + number
         return before

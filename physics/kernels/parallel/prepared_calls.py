@@ -1,4 +1,4 @@
-"""Make calls that are prepared in memory, one after another: a job is a row of a table (`fused.prepared_entry`)."""
+"""Make prepared calls one after another: a job is a row of a table in memory (`fused.prepared_entry`)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from physics.kernels.compile.fused.prepared_calls import JOB_BYTES, enter_prepar
 
 @kernel
 def run_jobs(jobs, count):
-    """Make the `count` calls of the table at the address `jobs`; whether one raised an exception, which is the last."""
+    """Make `count` calls of the table at the address `jobs`; True if one raised an exception, which ends them."""
     for k in range(count):
         if enter_prepared(jobs + k * JOB_BYTES) != 0:
             return True
@@ -17,11 +17,11 @@ def run_jobs(jobs, count):
 
 @kernel
 def run_job(job):
-    """Make one call, of the row at the address `job`; whether it raised an exception. One number less to hand over."""
+    """Make one call, of the row at the address `job`; return whether it raised an exception."""
     return enter_prepared(job) != 0
 
 
 @kernel
 def reraise(code, raised):
-    """Raise what a call raised."""
+    """Raise the exception of a call."""
     raise_prepared(code, raised)

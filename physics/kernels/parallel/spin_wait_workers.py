@@ -53,13 +53,13 @@ RUN_DONE, RUN_UNFINISHED, RUN_FAILED = range(3)
 
 
 def make_worker_table(members: int) -> np.ndarray:
-    """(1 + members, PADDING_WORDS) int64, all of them away."""
+    """Table (1 + members, PADDING_WORDS) int64 with all members away."""
     return np.zeros((1 + members, PADDING_WORDS), dtype=np.int64)
 
 
 @kernel
 def wake_workers(crew, turns, members):
-    """Call the first members to a batch of which nothing is taken; how many were away and have to be sent for."""
+    """Call the first members to a new batch; return the number of those that are away and must be sent for."""
     reset_ranges(turns)
     crew[0, CREW_FAILED_COUNT] = crew[0, CREW_LEADER_DONE] = away = 0
     crew[0, CREW_LEADER_PROCESSOR] = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
@@ -71,7 +71,7 @@ def wake_workers(crew, turns, members):
 
 @kernel
 def stop_workers(crew):
-    """Let all members go: at once, or after the call that they are busy with."""
+    """Dismiss all members, each at once or after its present call."""
     for k in range(1, crew.shape[0]):
         while SPINNING <= atomic_load(crew, k, WORKER_STATE) <= RUNNING:
             compare_exchange(crew, k, WORKER_STATE, WOKEN, IDLE)
@@ -81,7 +81,7 @@ def stop_workers(crew):
 
 @inlined
 def _rest(crew, look):
-    """Wait for a moment after so many looks; the leader may need this processor for its part of the run."""
+    """Pause after so many polls; the leader may need this processor for its own work."""
     spin_pause()
     if look % crew[0, CREW_YIELD_INTERVAL] == 0 or (
         look == crew[0, CREW_BRIEF_PAUSES] and atomic_load(crew, 0, CREW_LEADER_DONE) == 0
@@ -91,7 +91,7 @@ def _rest(crew, look):
 
 @inlined
 def _is_busy(crew, member, patience):
-    """True if the member has not finished after so many looks."""
+    """True if the member has not finished after so many polls."""
     for look in range(1, patience + 1):
         if atomic_load(crew, member, WORKER_STATE) != RUNNING:
             return False
@@ -101,7 +101,7 @@ def _is_busy(crew, member, patience):
 
 @kernel
 def run_and_join(crew, taken, members, jobs, count, patience):
-    """Make calls, and wait until all members who have begun have finished or `patience` is over; what became of it."""
+    """Make calls, and wait until all members that began have finished or `patience` is over; return the outcome."""
     if run_jobs(jobs, count):
         atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
     atomic_exchange(crew, 0, CREW_LEADER_DONE, 1)
@@ -116,7 +116,7 @@ def run_and_join(crew, taken, members, jobs, count, patience):
 
 @inlined
 def _is_in_the_way(crew):
-    """True if a member has the leader's processor and would only delay it; the member has given way then."""
+    """True if a member runs on the leader's processor and would only delay it; the member has then yielded."""
     processor = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
     if processor < 0 or processor != crew[0, CREW_LEADER_PROCESSOR]:
         return False
@@ -126,7 +126,7 @@ def _is_in_the_way(crew):
 
 @inlined
 def _begins(crew, member, patience):
-    """True if the member, waiting, is called within so many looks; else it is away."""
+    """True if the waiting member is called within so many polls; else it is away."""
     for look in range(1, patience + 1):
         state = atomic_load(crew, member, WORKER_STATE)
         if state == WOKEN and not _is_in_the_way(crew) and compare_exchange(crew, member, WORKER_STATE, WOKEN, RUNNING):
@@ -146,7 +146,7 @@ def _begins(crew, member, patience):
 
 @kernel
 def worker_loop(crew, member, patience):
-    """Be a member: make its calls each time that it is called, until it is not for so long."""
+    """Run a member: make its calls each time it is called, and leave after a long wait."""
     while _begins(crew, member, patience):
         if run_jobs(crew[member, WORKER_JOBS], crew[member, WORKER_JOB_COUNT]):
             atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
@@ -157,6 +157,6 @@ def worker_loop(crew, member, patience):
 
 @kernel
 def repeat_pause(times):
-    """Pause so many times: how long that takes is how long a patience lasts."""
+    """Make so many pauses, to measure the length of one."""
     for _ in range(times):
         spin_pause()

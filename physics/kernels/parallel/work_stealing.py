@@ -1,4 +1,4 @@
-"""Work stealing of threads over a batch: each takes the next few worlds of its own range, then of the others' ranges.
+"""Work stealing over a batch: each thread takes the next few worlds of its own range, then of the others' ranges.
 
 They do so in machine code, without the interpreter in between: its lock changes hands only when a thread begins and
 ends. A thread finds the worlds of its own range in the cache of its processor, where it left them after the last step.
@@ -26,7 +26,7 @@ TAKEN_COUNT, TAKEN_CHUNK_END, TAKEN_RANGE, TAKEN_OWN_RANGE, TAKEN_FIRST_WORLD = 
 
 
 def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
-    """(1 + threads, PADDING_WORDS) int64: the worlds in as many ranges as there are threads."""
+    """Ranges (1 + threads, PADDING_WORDS) int64 of worlds, one for each thread."""
     turns = np.zeros((1 + threads, PADDING_WORDS), dtype=np.int64)
     turns[0, RANGE_CHUNK] = chunk
     turns[1:, RANGE_END] = worlds * np.arange(1, threads + 1) // threads
@@ -34,7 +34,7 @@ def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
 
 
 def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
-    """(threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64, a row for each thread: nothing taken yet."""
+    """Lists (threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64 of taken worlds, one row per thread, empty."""
     lists = np.zeros((threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS), dtype=np.int64)
     lists[:, TAKEN_OWN_RANGE] = 1 + np.arange(threads)
     return lists
@@ -42,7 +42,7 @@ def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
 
 @inlined
 def begin_taking(turns, taken):
-    """Nothing taken yet; returns what comes before the first world. A thread that is alone resets its range itself."""
+    """Clear the taken worlds; return the index before the first world. A single thread also resets its range."""
     if turns.shape[0] == 2:
         turns[1, RANGE_NEXT] = turns[0, RANGE_END]
     taken[TAKEN_COUNT] = taken[TAKEN_CHUNK_END] = 0
@@ -52,7 +52,7 @@ def begin_taking(turns, taken):
 
 @kernel
 def take_chunk(turns, taken):
-    """First of the next worlds of the thread, of which `taken[TAKEN_CHUNK_END]` is the end, or -1."""
+    """First of the thread's next worlds, which end at `taken[TAKEN_CHUNK_END]`, or -1."""
     chunk = turns[0, RANGE_CHUNK]
     for _ in range(1, turns.shape[0]):
         place = taken[TAKEN_RANGE]
@@ -66,7 +66,7 @@ def take_chunk(turns, taken):
 
 @inlined
 def next_world(world, turns, taken):
-    """The world that the thread steps after `world`, or -1.
+    """World that the thread steps after `world`, or -1.
 
     Parameters
     ----------
@@ -88,13 +88,13 @@ def next_world(world, turns, taken):
 
 @inlined
 def reset_ranges(turns):
-    """Nobody has taken anything."""
+    """Reset all ranges, with no world taken."""
     for k in range(1, turns.shape[0]):
         turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0
 
 
 def for_each_world(advance):
-    """Make a kernel (queue, about) of the one loop over worlds: call ``advance(world, *about)`` for each.
+    """Make the kernel (queue, about) with the one loop over worlds, which calls ``advance(world, *about)`` for each.
 
     A thread takes worlds that no other thread has taken (`WorkQueue` of `physics.kernels.state.groups`).
 

@@ -1,1 +1,1 @@
-"""Memory layouts: state of a body, records of a step, and the contact laws that a kernel is compiled for."""
+"""Memory layouts: state of a body, records of a step, and contact laws that a kernel is compiled for."""

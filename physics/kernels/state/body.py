@@ -1,4 +1,4 @@
-"""Record of one body for one step: read and prepared once, then handed from stage to stage."""
+"""Record of one body for one step, prepared once and passed from stage to stage."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def _gravity_of(world, bodies):
 
 @inlined
 def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, work):
-    """Write what the step needs of body i into `work`: parameters, and the loads that are held over the step.
+    """Write parameters of body i, and the loads held over the step, into `work`.
 
-    gravity, friction, restitution and offset_frame are None where the scene does not have them: offset_frame, where the
-    principal axes of every body are its body axes and its geometric centre is its centre of mass.
+    gravity, friction, restitution and offset_frame are None if the scene does not have them. offset_frame is None if
+    the principal axes of every body are its body axes, and its geometric centre is its centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
     gravity = _gravity_of(world, bodies)
@@ -101,13 +101,13 @@ def find_nonfinite_body(now):
 
 @inlined
 def has_finite_loads(work):
-    """True if the loads that `bind_body` has found are finite, and far from overflowing (`layout.OVERFLOW_LIMIT`)."""
+    """True if the loads found by `bind_body` are finite and far from overflow (`layout.OVERFLOW_LIMIT`)."""
     return work.acceleration <= at.OVERFLOW_LIMIT
 
 
 @inlined
 def find_overloaded_body(bodies):
-    """The first of the records `bodies` with loads that it cannot bear, -1: none."""
+    """Index of the first of the records `bodies` with loads too large to bear; -1 if there is none."""
     for b in range(bodies.shape[0]):
         if not has_finite_loads(bodies[b]):
             return b
@@ -116,14 +116,14 @@ def find_overloaded_body(bodies):
 
 @inlined
 def clear_report(world, report):
-    """Begin the report of a world's steps."""
+    """Clear the report of a world at the start of its steps."""
     for c in range(at.REPORT_SIZE):
         report[world, c] = 0.0
 
 
 @inlined
 def report_fault(world, b, report):
-    """Body b of a world keeps its old state."""
+    """Report a fault of body b of a world, which keeps its old state."""
     report[world, at.FAULTS] += 1.0
     if report[world, at.FIRST_FAULTY] == 0.0:
         report[world, at.FIRST_FAULTY] = 1.0 + b
@@ -131,7 +131,7 @@ def report_fault(world, b, report):
 
 @inlined
 def principal_attitude(q, work, offset_frame):
-    """Quaternion of the principal frame from that of the body frame (the same unless `offset_frame`)."""
+    """Quaternion of the principal frame, from that of the body frame (equal unless `offset_frame`)."""
     if offset_frame is None:
         return q
     p = work.principal
@@ -140,7 +140,7 @@ def principal_attitude(q, work, offset_frame):
 
 @inlined
 def principal_matrix(q, R, work, offset_frame):
-    """Matrix of `principal_attitude`, R of the body frame's (the same unless `offset_frame`)."""
+    """Matrix of `principal_attitude`, from the matrix R of the body frame (equal unless `offset_frame`)."""
     if offset_frame is None:
         return R
     return qt.to_matrix(principal_attitude(q, work, offset_frame))
@@ -148,7 +148,7 @@ def principal_matrix(q, R, work, offset_frame):
 
 @inlined
 def body_attitude(q, work, offset_frame):
-    """The inverse of `principal_attitude`."""
+    """Quaternion of the body frame, from that of the principal frame."""
     if offset_frame is None:
         return q
     p = work.principal

@@ -1,4 +1,4 @@
-"""Laws of contact beyond Coulomb's that only some scenes declare: which ones is read off the type of the workspace.
+"""Contact laws beyond Coulomb's, which only some scenes declare: dispatch by the type of the workspace.
 
 As with force fields (`fields.terms`): the workspace has a member `law_rolling` where the scene declares rolling
 friction, its numbers stand in `work.laws`, and a kernel that asks for them is compiled per type of the
@@ -30,7 +30,7 @@ def _declared(work) -> list[str]:
 
 
 def if_law(laws: tuple[str, ...], instead):
-    """Make a function, whose last argument is the workspace, a kernel; where no such law is declared it is `instead`.
+    """Make a kernel of a function whose last argument is the workspace; `instead` takes its place without such laws.
 
     `instead` takes the same arguments and is inlined.
     """
@@ -38,7 +38,7 @@ def if_law(laws: tuple[str, ...], instead):
 
 
 def law_parameter(law: str, otherwise: float = 0.0):
-    """A kernel (work) that gives the number of a law for the body in the workspace; `otherwise` if undeclared."""
+    """Make a kernel (work) that returns a law's number for the body in the workspace; `otherwise` if undeclared."""
 
     def chosen(work):
         declared = _declared(work)
@@ -56,7 +56,7 @@ def _nothing(params, i, work):
 
 @if_law(LAWS, _nothing)
 def bind_laws(params, i, work):
-    """Take the numbers of body i into `work`."""
+    """Store the laws' numbers of body i in `work`."""
     count = work.laws.shape[0]
     for k in range(count):
         work.laws[k] = params[i, params.shape[1] - count + k]

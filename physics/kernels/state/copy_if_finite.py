@@ -1,4 +1,4 @@
-"""Numbers that users hand in, taken over in one pass."""
+"""Copy and check users' numbers in one pass."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from physics.kernels.compile.simd import LANE_COUNT, Lanes, lane_sum, load_lanes
 
 @kernel
 def copy_if_finite(source, target):
-    """Copy (1, n) float64 to (1, n) float64: whether all of them are finite, which x - x = 0 says."""
+    """Copy (1, n) float64 to (1, n) float64; return whether all are finite, that is whether x - x = 0."""
     n, k, odd = source.shape[1], 0, 0.0
     first = second = Lanes(0.0, 0.0, 0.0, 0.0)  # two sums side by side: neither waits for the other
     while k + 2 * LANE_COUNT <= n:

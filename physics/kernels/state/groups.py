@@ -1,4 +1,4 @@
-"""Arguments of a step that travel together, as named tuples: switches, arrays of bodies, the books of a step.
+"""Arguments of a step that travel together, as named tuples: switches, arrays of bodies, records of a step.
 
 A switch is None (off) or not (on). Which of two functions is called, or which of two answers given, is chosen by its
 type (`physics.kernels.compile.decorators.if_given`).
@@ -21,7 +21,7 @@ class WorkQueue(NamedTuple):
 
 
 class TimeGrid(NamedTuple):
-    """Time that a call covers."""
+    """Time interval of a call."""
 
     steps: int
     substeps: int  # of each step
@@ -39,7 +39,7 @@ class BodyArrays(NamedTuple):
 
 
 class ContactSwitches(NamedTuple):
-    """Contact of a scene."""
+    """Switches of a scene's contact."""
 
     acts: bool | None  # bodies touch walls
     friction: bool | None  # with friction: three unknowns a contact instead of one
@@ -47,7 +47,7 @@ class ContactSwitches(NamedTuple):
 
 
 class FlightSwitches(NamedTuple):
-    """Free motion of a scene's bodies."""
+    """Switches of the free motion of a scene's bodies."""
 
     gyroscopic: bool | None  # moments of inertia differ
     offset_frame: bool | None  # principal axes are not the body's axes, or its centre is not its centre of mass
@@ -55,7 +55,7 @@ class FlightSwitches(NamedTuple):
 
 
 class MultibodySwitches(NamedTuple):
-    """Bodies that touch each other."""
+    """Switches of bodies that touch each other."""
 
     friction: bool | None
     flight: FlightSwitches

@@ -1,4 +1,4 @@
-"""Columns of the arrays that the kernels share: the place of each number of a body.
+"""Columns of the arrays that the kernels share: one for each number of a body.
 
 One row per (world, body), contiguous, so that a step reads what it needs from
 two or three cache lines. `i` is always the flat index world * body_count + body.

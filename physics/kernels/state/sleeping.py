@@ -1,4 +1,4 @@
-"""Bodies at rest that are left alone: what is kept of each body, and how one falls asleep.
+"""Sleeping bodies: the record of each body, and the rule for falling asleep.
 
 A body is watched in windows of time, from a pose at the start of each. Its way in a window is the largest distance of
 any of its points from there, or what the speed at the end of a substep would move one in it: motion that comes back to
@@ -41,7 +41,7 @@ _SLEEP_GROWTH = 2.0
 
 
 class Sleep(NamedTuple):
-    """Sleep of bodies as a step reads it; None where the scene does not declare it."""
+    """Sleep of bodies for a step; None if the scene does not declare it."""
 
     rows: np.ndarray  # (worlds * bodies, SLEEP_SIZE)
     way: float  # that counts as none [bounding radii]
@@ -50,7 +50,7 @@ class Sleep(NamedTuple):
 
 @inlined
 def is_asleep(i, sleep):
-    """True if body i sleeps: never, where the scene does not declare it."""
+    """True if body i sleeps; False if the scene does not declare sleep."""
     if sleep is None:
         return False
     return sleep.rows[i, SLEEP_GROUP] > 0.0
@@ -58,13 +58,13 @@ def is_asleep(i, sleep):
 
 @inlined
 def wake_body(i, sleep):
-    """Wake body i, or let its watch begin anew."""
+    """Wake body i, or restart its window."""
     sleep.rows[i, SLEEP_GROUP] = sleep.rows[i, SLEEP_CLOCK] = sleep.rows[i, QUIET_WINDOWS] = 0.0
 
 
 @inlined
 def has_new_wrench(i, wrench, sleep):
-    """True if another wrench acts on body i than so far; it is the one that counts from now on."""
+    """True if the wrench on body i has changed; the new one is stored."""
     is_other = False
     for c in range(6):
         if wrench[i, c] != sleep.rows[i, SLEEP_WRENCH + c]:
@@ -74,7 +74,7 @@ def has_new_wrench(i, wrench, sleep):
 
 @inlined
 def _way_from_start(i, y, radius, rows):
-    """Bound for the distance of any point of the body from where it was at the window's start [m].
+    """Bound of the distance of any point of the body from its place at the window's start [m].
 
     A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): at most 2 r |q - q0|. Sums of
     absolute values are no less than norms.
@@ -89,7 +89,7 @@ def _way_from_start(i, y, radius, rows):
 
 @inlined
 def _fastest_point(y, work):
-    """Bound for the speed of any point of the body [m/s]: |v| + r |ω|, |ω| <= |L| over the least moment."""
+    """Bound of the speed of any point of the body [m/s]: |v| + r |ω|, |ω| <= |L| over the least moment."""
     _, _, v, L = y
     spin = max(work.J[0], work.J[1], work.J[2]) * (abs(L[0]) + abs(L[1]) + abs(L[2]))
     return abs(v[0]) + abs(v[1]) + abs(v[2]) + work.radius * spin
@@ -108,7 +108,7 @@ def _begin(i, y, rows):
 
 @inlined
 def _is_over(clock, work, sleep):
-    """True if a window that has lasted so long is over: √(2 r/a) is how long it takes to fall r at a."""
+    """True if a window of this length is over: √(2 r/a) is the time to fall r at a."""
     if sleep.time > 0.0:
         return clock >= sleep.time
     return clock * clock * work.acceleration >= 2.0 * work.radius
@@ -116,7 +116,7 @@ def _is_over(clock, work, sleep):
 
 @kernel
 def update_sleep_window(i, y, h, work, sleep):
-    """Take note of where body i is after a substep of h: whether a quiet window has ended and there were enough."""
+    """Record the place of body i after a substep of h; return whether the last of enough quiet windows has ended."""
     rows = sleep.rows
     if rows[i, SLEEP_CLOCK] == 0.0:
         _begin(i, y, rows)
@@ -139,19 +139,19 @@ def update_sleep_window(i, y, h, work, sleep):
 
 @inlined
 def is_motion_growing(last, before):
-    """True if the way in the last window says that what moves will move further."""
+    """True if the displacement in the last window shows a motion that grows."""
     return not last <= _SLEEP_GROWTH * before
 
 
 @inlined
 def without_velocities(y):
-    """The state y without motion."""
+    """State y without velocities."""
     return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @inlined
 def remains_asleep(i, wrench, sleep):
-    """True if body i, which meets walls only, sleeps and goes on to do so under this wrench."""
+    """True if body i, which meets walls only, sleeps and stays asleep under this wrench."""
     if has_new_wrench(i, wrench, sleep):
         wake_body(i, sleep)
     return sleep.rows[i, SLEEP_GROUP] > 0.0
@@ -159,7 +159,7 @@ def remains_asleep(i, wrench, sleep):
 
 @inlined
 def falls_asleep(i, y, h, work, sleep):
-    """`update_sleep_window` body i, which meets walls only: whether it falls asleep now."""
+    """Do `update_sleep_window` for body i, which meets walls only; return whether it falls asleep now."""
     if update_sleep_window(i, y, h, work, sleep) and not is_motion_growing(
         sleep.rows[i, LAST_DISPLACEMENT], sleep.rows[i, EARLIER_DISPLACEMENT]
     ):

@@ -1,1 +1,1 @@
-"""Time stepping of single bodies: impacts where they happen, Moreau's midpoint step between them."""
+"""Time stepping of single bodies: impacts at their times, Moreau's midpoint step between them."""

@@ -1,4 +1,4 @@
-"""The record of what happened: one row per event, in the order of the bodies that it happened to.
+"""Log of events: one row per event, in the order of the bodies.
 
 A step that has no room for events (`World.make_event_room`) logs none, and asks once per impact whether it has.
 """
@@ -28,7 +28,7 @@ EVENT_IMPULSE_ROUNDING = 1.0e-14
 
 
 class Event(NamedTuple):
-    """Event of a body; all vectors in the world frame, zero where they mean nothing."""
+    """Event of a body; all vectors in the world frame, zero where undefined."""
 
     kind: int  # KIND_IMPACT and so on
     wall: int  # wall, or NOBODY
@@ -40,7 +40,7 @@ class Event(NamedTuple):
 
 @kernel
 def note_event(log, counts, i, t, event):
-    """Add an `Event` of body i at the time t [s]; one that finds no room is counted only."""
+    """Add an `Event` of body i at the time t [s]; an event without room is only counted."""
     k = counts[i]
     counts[i] = k + 1
     if k < log.shape[1]:
@@ -54,7 +54,7 @@ def note_event(log, counts, i, t, event):
 
 @inlined
 def clear_events(world, bodies, log, counts):
-    """No event of a world yet; nothing to do where there is no room for any."""
+    """Clear the events of a world, if its log has room for any."""
     if log.shape[1] > 0:
         for i in range(world * bodies, (world + 1) * bodies):
             counts[i] = 0
@@ -62,7 +62,7 @@ def clear_events(world, bodies, log, counts):
 
 @kernel
 def drop_events(world, bodies, t, log, counts):
-    """Take back what was logged of a world from the time t on: its state is not what came of it."""
+    """Remove a world's events from the time t on, after its state was put back."""
     for i in range(world * bodies, (world + 1) * bodies):
         while 0 < counts[i] <= log.shape[1] and log[i, counts[i] - 1, EVENT_TIME] >= t:
             counts[i] -= 1
@@ -70,14 +70,14 @@ def drop_events(world, bodies, t, log, counts):
 
 @inlined
 def note_mode_change(log, counts, i, t, kind, wall):
-    """Add an event of body i that has no impulse."""
+    """Add an event of body i without an impulse."""
     zero = (0.0, 0.0, 0.0)
     note_event(log, counts, i, t, Event(kind, wall, NOBODY, zero, zero, zero))
 
 
 @inlined
 def add_weighted_contact(sums, normal, pushed, point):
-    """Weighted sums of the contacts of a pair: of the normals, of the points, and of the weights.
+    """Add a contact to the weighted sums of its pair: of normals, of points, and of weights.
 
     The weights are the normal impulses: where the normals are the same the mean point is that about which these have
     no moment.

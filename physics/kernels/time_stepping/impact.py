@@ -35,10 +35,10 @@ def set_plastic_targets(n, work):
 
 @inlined
 def resolve_impacts(n, y, t, h, contact, offset_frame, records, work):
-    """State after the impulses of the contacts that approach, unchanged when none does; and whether nothing was hit.
+    """State after the impulses of the contacts that approach, unchanged without one; and whether nothing was hit.
 
-    It happens t [s] after the start of the call, with h [s] left of the substep. What goes on from the last stage has
-    hit nothing: its impulses are in `work.rebound`, and belong to the forces of the stage that follows.
+    The impact is t [s] after the start of the call, with h [s] left of the substep. A contact that continues from the
+    last stage has hit nothing: its impulses are in `work.rebound`, and belong to the forces of the next stage.
     """
     x, q, v, L = y
     bounce_speed = work.rest_share * work.acceleration * h

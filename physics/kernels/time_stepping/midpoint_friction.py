@@ -49,8 +49,9 @@ def _tangential(i, v, w, work):
 def _least_slip(w, h, work):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
-    What the target of a contact that held (`target_velocity.set_resting_targets`) left over in the stage before: the
-    tolerance of its solve, and h² (ω α + ω³ r) but of a sphere, whose arm does not turn with it.
+    The limit is the error of a sticking contact's target (`target_velocity.set_resting_targets`) in the stage before.
+    It is the tolerance of its solve plus h² (ω α + ω³ r); for a sphere, whose arm does not turn with it, the tolerance
+    alone.
     """
     least = work.tolerance * work.acceleration * h
     if work.shape == SPHERE:
@@ -61,7 +62,7 @@ def _least_slip(w, h, work):
 
 @if_given("contact.friction", False)
 def oppose_mean_slip(n, contact, v, w, h, work):
-    """Let friction oppose the mean slip of the stage: whether all contacts slip.
+    """Let friction oppose the mean slip of the stage; return whether all contacts slip.
 
     Parameters
     ----------
@@ -91,14 +92,14 @@ def oppose_mean_slip(n, contact, v, w, h, work):
 
 @inlined
 def oppose_end_slip(n, work):
-    """Take `oppose_mean_slip` back."""
+    """Undo `oppose_mean_slip`."""
     for i in range(n):
         work.target[i, 1], work.target[i, 2] = work.held_target[i, 0], work.held_target[i, 1]
 
 
 @inlined
 def has_slip_reversed(n, v, w, work):
-    """True if the slip of a contact that pushes is against the one before, -`work.target`, after impulses."""
+    """True if the slip of a pushing contact opposes the earlier slip, -`work.target`, after impulses."""
     ratio = friction_ratio(work)
     for i in range(n):
         a, b = _tangential(i, v, w, work)
@@ -114,10 +115,10 @@ def _as_solved(n, contact, v, w, solved, free, R, h, work):
 
 @if_law((LAW_STIFFNESS,), _as_solved)
 def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
-    """Result of `solve_contacts` for `free` (v, L); if friction gave energy, that with friction against the mean slip.
+    """Result of `solve_contacts` for `free` (v, L), with friction against the mean slip if it created energy.
 
-    An impulse p adds p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰, which in a rigid impact the normal
-    impulse outweighs. A spring pushes as much as it is deep, not as much as would do that.
+    An impulse p adds the energy p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰. In a rigid impact the normal
+    impulse outweighs this. The push of a spring depends on its depth, and may not.
 
     Parameters
     ----------

@@ -33,19 +33,19 @@ from physics.kernels.time_stepping.rolling_friction import apply_resistance_torq
 from physics.kernels.time_stepping.stage_energy import limit_stage_energy
 from physics.kernels.time_stepping.warm_start import load_warm_start, store_warm_start
 
-# Slops that what is pressed by strong loads may move in a step.
+# Slops that a body pressed against a wall by strong loads may move in a step.
 CREEP_SLOP_SHARE = 0.01
 
-# Slops that contacts which hold may miss their targets by in a step.
+# Slops by which sticking contacts may miss their targets in a step.
 TARGET_ERROR_SLOP_SHARE = 0.01
 
 
 @inlined
 def rest_residual(h, work):
-    """Residual that a resting stage of length h is solved to whatever the tolerance allows [m/s].
+    """Largest residual of a resting stage of length h, whatever the tolerance allows [m/s].
 
-    A share of the speed that loads give in h is a place error of that share of a h² in every step. Under loads so
-    strong that this is more than a slop what is pressed against walls would creep: it is held to a small part of one.
+    A residual of ε a h lets a body drift by ε a h² per step. Strong loads make this more than a slop, and a body
+    pressed against a wall would creep. Then the residual is limited so that the drift is a small part of a slop.
     """
     slop_speed = work.slop / h
     if work.tolerance * work.acceleration * h > slop_speed:

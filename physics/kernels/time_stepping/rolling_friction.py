@@ -5,11 +5,11 @@ Rolling and spin friction are torques. With the normal impulse p of a contact, �
     across the normal   |T| <= a p,    T against ω - (n·ω) n   (rolling)
     along the normal    |T| <= b p,    T against (n·ω) n       (spin)
 
-each as large as it may be while there is turning for it to oppose, and no larger than stops it. The stage knows p only
-when its contacts are solved, and friction answers to the torque: a ball that rolls is slowed by it as a whole, one
-that slides is not. So the stage is solved again with the whole torque among the loads of the body, and where that
-would turn the body round, with the share of it that leaves no turning (it is found by false position: between the
-changes from sticking to sliding the contact problem is linear).
+Each is as large as allowed while there is a rotation to oppose, and at most as large as stops it. The stage knows p
+only when its contacts are solved, and friction answers to the torque: it slows a rolling ball as a whole, but not a
+sliding one. So the stage is solved again with the whole torque among the loads of the body. If that would reverse the
+rotation, the share of the torque that leaves none is used. False position finds it, since between the changes from
+sticking to sliding the contact problem is linear.
 
 References
 ----------
@@ -47,7 +47,7 @@ def _added(L, s, T):
 
 @inlined
 def _against(n, width, across, along, w, work):
-    """Angular impulse against the turning w, of the normal impulses in `work`, with arms across and along normals."""
+    """Angular impulse against the turning w, from the normal impulses in `work`, with arms across and along normals."""
     x = y = z = 0.0
     for k in range(n):
         p = max(work.impulse[width * k], 0.0)
@@ -63,7 +63,7 @@ def _against(n, width, across, along, w, work):
 
 @kernel
 def _resist(n, contact, across, along, v, L, solved, R, work):
-    """One torque: what `solve_contacts` gives with it, and L with it but without the contacts."""
+    """Solve with one torque: result of `solve_contacts`, and L with the torque but without the contacts."""
     width = rows_per_contact(contact)
     w = apply_inv_inertia(R, solved[1], work.J)
     T = _against(n, width, across, along, w, work)

@@ -1,4 +1,4 @@
-"""Motion of bodies that springs tie together, to a tolerance: the extrapolated midpoint rule for all of them at once.
+"""Extrapolated midpoint rule, to a tolerance, for all bodies tied by springs at once.
 
 As `events.smooth` does for one body (Gragg's rule with 2, 4, 6, ... parts, Neville's table in the squares of the parts'
 length; two neighbours that agree end the step), but there is nothing to touch: a step is cut for its error alone.
@@ -34,7 +34,7 @@ _EASY_RULES = 5
 
 @kernel
 def _put_rate(t, offset_frame, linked):
-    """Rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
+    """Write the rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
     room, bodies = linked.room, linked.work
     for b in range(bodies.shape[0]):
         s = room[PLANE_HERE, b]
@@ -58,7 +58,7 @@ def _put_rate(t, offset_frame, linked):
 
 @inlined
 def _put_start(linked):
-    """The states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
+    """Copy the states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
     for b in range(linked.state.shape[0]):
         x, q, v, L = read_state(linked.state, b)
         for plane in (PLANE_BEFORE, PLANE_HERE):
@@ -71,7 +71,7 @@ def _put_start(linked):
 
 @kernel
 def _midpoint(parts, h, t, row, offset_frame, linked):
-    """Gragg's rule of so many parts, an even number, over h from time t into row `row` of the table."""
+    """Do Gragg's rule of so many parts, an even number, over h from time t into row `row` of the table."""
     room, s = linked.room, h / parts
     _put_start(linked)
     for k in range(parts):
@@ -92,7 +92,7 @@ def _midpoint(parts, h, t, row, offset_frame, linked):
 
 @kernel
 def _extrapolate(row, h, linked):
-    """Neville's table with one more rule: its best value stands in row 0 then, with that value's error.
+    """Add a rule to Neville's table: its best value then stands in row 0, with that value's error.
 
     Row j holds T of rule j and column row - j. The error is relative to size, or speed and what the step makes of it.
     """
@@ -120,7 +120,7 @@ def _extrapolate(row, h, linked):
 
 @kernel
 def extrapolate_linked(h, offset_frame, linked):
-    """All bodies after h, to the tolerance; whether it got there in the steps allowed."""
+    """Advance all bodies by h, to the tolerance; return whether the allowed steps sufficed."""
     start, t, step = linked.work[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
@@ -147,6 +147,6 @@ def extrapolate_linked(h, offset_frame, linked):
 
 @kernel
 def step_linked_segment(world, h, offset_frame, report, linked):
-    """`extrapolate_linked`, with what it could not do in the report."""
+    """Do `extrapolate_linked`, and report failures."""
     if not extrapolate_linked(h, offset_frame, linked):
         report[world, at.UNRESOLVED] += 1.0

@@ -1,4 +1,4 @@
-"""A step of worlds whose bodies springs tie together and that touch nothing: all bodies of a world at once.
+"""Step of worlds whose bodies are tied by springs and touch nothing: all bodies of a world at once.
 
 `physics.kernels.time_stepping.step` advances each body to the end of the call before it looks at the next; here all of
 them go from stage to stage together. Where bodies may touch something it is `physics.kernels.multibody.stepping.step`
@@ -42,7 +42,7 @@ from physics.kernels.time_stepping.workspace import body_fields
 
 
 class LinkedWorld(NamedTuple):
-    """Bodies of the world that a thread is at."""
+    """Bodies of the world that a thread steps."""
 
     work: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
     state: np.ndarray  # columns of `layout`
@@ -68,7 +68,7 @@ def make_linked_world(
 
 @kernel
 def _substep(h, flight, linked):
-    """All bodies after h by the loads of the middle."""
+    """Advance all bodies by h with the loads of the middle."""
     hold_linked_loads(h, flight.gyroscopic, flight.offset_frame, linked)
     note_stage_energy(flight.offset_frame, linked, linked.work[0])
     for b in range(linked.state.shape[0]):
@@ -121,5 +121,5 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_linked(queue, grid, bodies, flight, held, events, records, linked):
-    """Advance the worlds that no other thread has taken, of bodies that springs tie together: `advance_world`."""
+    """Advance the worlds that no other thread has taken, with bodies tied by springs: `advance_world`."""
     _advance_worlds(queue, (grid, bodies, flight, held, events, records, linked))

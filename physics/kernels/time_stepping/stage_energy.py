@@ -1,4 +1,4 @@
-"""Energy of a resting stage: impulses that raise it are replaced by those for targets that cannot."""
+"""Energy of a resting stage: impulses that raise it are replaced by those of dissipative targets."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
 
 @inlined
 def motion_square(n, velocity, work):
-    """Square of the velocity that the contacts may act on: without friction, of one wall, only that along its normal.
+    """Square of the velocity that contacts may change: without friction at one wall, only the normal part.
 
-    A body that moves along a frictionless wall, however fast, does the same as one that does not.
+    The result must not depend on the velocity of a body along a frictionless wall.
     """
     wall = wall_of(work.slot[0], work)
     if not work.mu > 0.0 and wall_of(work.slot[n - 1], work) == wall:
@@ -28,7 +28,7 @@ def motion_square(n, velocity, work):
 
 @inlined
 def has_energy_gain(n, before, w, v, L, solved, R, h, work):
-    """True if the impulses of a resting stage raise the energy by more than its solve and its step may be off.
+    """True if the impulses of a resting stage raise the energy beyond the errors of its solve and its step.
 
     Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
     the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
@@ -56,11 +56,11 @@ def has_energy_gain(n, before, w, v, L, solved, R, h, work):
 
 @inlined
 def set_dissipative_targets(n, before, w, work):
-    """Targets that cannot raise the energy: no contact is pushed off or along, and what leaves is turned round.
+    """Set targets that cannot raise the energy: none lets a contact gain speed, and leaving contacts are reversed.
 
     A push p changes the energy by p·½(u + u'), with u and u' the normal velocities of its contact before and after. So
-    one that loads bring back within the stage, u > 0, comes back as fast as it left, instead of being stopped above
-    its wall.
+    a leaving contact, u > 0, that loads bring back within the stage comes back as fast as it left. It is not stopped
+    above its wall.
     """
     for i in range(n):
         normal = wall_normal(work.walls, wall_of(work.slot[i], work))
@@ -80,8 +80,9 @@ def _calmed_if_it_gains(n, contact, before, w, solved, free, R, h, work):
 
 @if_law((LAW_STIFFNESS,), _calmed_if_it_gains)
 def limit_stage_energy(n, contact, before, w, solved, free, R, h, work):
-    """Result of `solve_contacts` for `free` (v, L); if that raises the energy, the one for calm targets.
+    """Result of `solve_contacts` for `free` (v, L), or of dissipative targets if that raises the energy.
 
-    If even that does, since no method solved it, as much of it as does not. Springs give back what they hold.
+    If even dissipative targets raise it, because no method solved them, the impulses are shortened until they do not.
+    Springs may give back the energy that they store.
     """
     return solved

@@ -91,7 +91,7 @@ IMPACT_TRIALS = 16
 
 @inlined
 def has_touched(memory, i):
-    """True if a body had contacts in its last stage: its bounding sphere touches a wall, or has just left it."""
+    """True if a body had contacts in its last stage, so that its bounding sphere touches a wall, or just left it."""
     return memory[i, WALL_MEMORY_COUNT] > 0.0
 
 
@@ -104,7 +104,7 @@ def forget_contacts(memory, i, work):
 
 @inlined
 def fly_stage(y, h, flight, work):
-    """Free motion over h under the loads that are held; where these are stiff, cut into parts."""
+    """Free motion over h under the held loads, cut into parts if they are stiff."""
     return subdivide_stiff_flight(integrate_flight(y, h, flight, work), y, h, flight, work)
 
 
@@ -127,7 +127,7 @@ def advance_stage(n, y, h, contact, flight, records, work):
 
 @inlined
 def outside_gap(y, offset_frame, work):
-    """Smallest gap of what is not in the contact set [m], and the slot of its feature."""
+    """Smallest gap outside the contact set [m], and the slot of its feature."""
     return nearest_outside_set(y[0], to_matrix(y[1]), offset_frame, work)
 
 
@@ -145,7 +145,7 @@ def has_same_pose(y, z):
 
 @cold_kernel
 def keep_out_of_walls(y, offset_frame, work):
-    """y, pushed out of the walls where it is deeper in than the slop: what turns by radians in a step may be so."""
+    """State y, pushed out of walls where it is deeper than the slop, as bodies that turn by radians may be."""
     return lift_conserving_energy(
         project_out_of_walls(y[0], to_matrix(y[1]), offset_frame, work), y, offset_frame, work
     )
@@ -153,12 +153,13 @@ def keep_out_of_walls(y, offset_frame, work):
 
 @cold_kernel
 def shorten_to_impact(n, y, end, h, contact, flight, records, work):
-    """A stage over h that ends at `end`, where a feature has passed through a wall, up to that: (state, time advanced).
+    """Shorten a stage over h to its first impact if a feature is through a wall at `end`: (state, time advanced).
 
-    It is shortened until that feature is within half a slop of the wall: `parabolic_root` of its gap. Another one that
-    is through the wall by then is sought instead. The gap of one feature is smooth; the smallest of all has kinks,
-    before which a parabola would creep along a wall that nothing hits. Impulses that no method solves may leap from
-    one time to the next. Then nothing is between, and the last state that was outside is taken.
+    The stage is shortened until the feature is within half a slop of the wall, by `parabolic_root` of its gap. If
+    another feature is through the wall by then, the search continues with that one. The gap of one feature is smooth.
+    The smallest gap of all has kinks, near which a parabola would creep along a wall that nothing hits. Impulses that
+    no method solves may leap from one time to the next. Then there is no state between, and the last one outside the
+    wall is taken.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
@@ -208,11 +209,11 @@ def advance_to_impact(n, y, h, contact, flight, records, work):
 
 @inlined
 def substep(y, start, h, contact, flight, records, work):
-    """State after h, `start` after the call [s]: impacts where they happen, flight or contact between them.
+    """State after h, `start` after the call [s]: impacts at their times, flight or contact between them.
 
-    When a substep has used up its cuts, its rest is one plastic stage with contacts wherever it would pass a wall. Cuts
-    for what turns far (`half_space.conservative_advancement`) are counted apart. When those are used up, a body that
-    turns far is treated as one that turns little.
+    When a substep has used up its cuts, the rest of it is one plastic stage, with contacts wherever it would pass a
+    wall. Cuts for bodies that turn far (`half_space.conservative_advancement`) are counted apart. When those are used
+    up, a body that turns far is treated as one that turns little.
     """
     left, splits, cuts = h, 0, 0
     world = work.world
@@ -256,7 +257,7 @@ def substep(y, start, h, contact, flight, records, work):
 
 @if_given("contact.acts", 0)
 def _clear_substeps(y, clear, h, left, contact, memory, work):
-    """Substeps, of those that are `left`, for which the body cannot reach a wall; `clear` where that is known."""
+    """Number of substeps, of those `left`, without contact with a wall; `clear` if that is known."""
     if clear > 0 or has_touched(memory, work.i):
         return clear
     clear = count_clear_substeps(y[0], y[2], h, left, work)

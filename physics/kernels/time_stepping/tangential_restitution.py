@@ -45,7 +45,7 @@ def set_tangential_target(k, y, offset_frame, work):
 
 @if_law((LAW_TANGENTIAL,), _no_aim)
 def set_tangential_targets(n, bounce_speed, y, offset_frame, work):
-    """Targets along the wall of the one contact that bounces; where several do, friction alone acts along them."""
+    """Set targets along the wall of the single bouncing contact; with several, friction alone acts along them."""
     bouncing, found = 0, 0
     for i in range(n):
         if -work.speed[i] > bounce_speed:
@@ -62,10 +62,10 @@ def _energy(v, L, R, work):
 
 @if_law((LAW_TANGENTIAL,), _as_solved)
 def reject_energy_gain(n, contact, v, L, solved, R, work):
-    """Result of `solve_contacts` for v and L; where that has gained energy, the one without `set_tangential_targets`.
+    """Result of `solve_contacts` for v and L, or the one without `set_tangential_targets` if that has gained energy.
 
-    A sphere's only contact cannot gain any: what it does along the wall and across does not mix. That of a sphere
-    which at the same time rests on another wall can, its coefficients there being others.
+    A sphere's only contact cannot gain energy, since its motions along and across the wall do not mix. A contact of a
+    sphere that also rests on another wall can, because the coefficients differ.
     """
     if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(v, L, R, work):
         return solved

@@ -13,7 +13,7 @@ def wall_memory_size(slots: int) -> int:
 
 @inlined
 def load_warm_start(n, width, memory, i, h, work):
-    """Impulses of the last resting stage, by slot, scaled to a stage of length h."""
+    """Load impulses of the last resting stage, by slot, scaled to a stage of length h."""
     first = WALL_MEMORY_HEAD + work.slot.shape[0]
     scale = 0.0
     if memory[i, WALL_MEMORY_STAGE] > 0.0:
@@ -37,7 +37,7 @@ def _are_kept(n, memory, i, work):
 
 @kernel
 def _keep_slots(n, memory, i, work):
-    """Forget the contacts of the last resting stage for those of this one, whose impulses are zero as yet."""
+    """Replace the contacts of the last resting stage by those of this one, with zero impulses."""
     first = WALL_MEMORY_HEAD + work.slot.shape[0]
     for k in range(int(memory[i, WALL_MEMORY_COUNT])):
         base = first + 3 * int(memory[i, WALL_MEMORY_HEAD + k])
@@ -50,7 +50,7 @@ def _keep_slots(n, memory, i, work):
 
 @inlined
 def store_warm_start(n, width, memory, i, h, work):
-    """Keep the impulses of this resting stage by slot; what no longer touches is forgotten."""
+    """Keep the impulses of this resting stage by slot, and drop those of contacts that have ended."""
     first = WALL_MEMORY_HEAD + work.slot.shape[0]
     memory[i, WALL_MEMORY_STAGE] = h
     if not _are_kept(n, memory, i, work):
@@ -63,7 +63,7 @@ def store_warm_start(n, width, memory, i, h, work):
 
 @cold_kernel
 def add_to_warm_start(n, width, memory, work):
-    """Add the impulses in `work.rebound` to those of the resting stage of the same contacts: forces are read there."""
+    """Add the impulses in `work.rebound` to those of the same contacts in the resting stage, where forces are read."""
     first = WALL_MEMORY_HEAD + work.slot.shape[0]
     for k in range(n):
         base = first + 3 * work.slot[k]

@@ -1,4 +1,4 @@
-"""Scratch memory of one thread: what a step knows of one body, and its contacts.
+"""Scratch memory of one thread: one body and its contacts during a step.
 
 It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
 filled anew for each body (`body.bind_body`); nothing in it outlives a step.
@@ -31,7 +31,7 @@ def setting_fields() -> list[tuple]:
 
 
 def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> list[tuple]:
-    """Fields of what `body.bind_body` writes of one body, and of what the scene's fields and laws do to it."""
+    """Fields for the numbers of one body from `body.bind_body`, and from the scene's fields and laws."""
     f, i = np.float64, np.int64
     return [
         *term_members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
@@ -59,7 +59,7 @@ def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> lis
 def workspace_dtype(
     wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
 ) -> np.dtype:
-    """Record type for bodies with `features` contact features each on `wall_count` walls, in these fields and laws."""
+    """Record type for bodies with `features` contact features each on `wall_count` walls, with fields and laws."""
     n = max(wall_count * features, 1)
     float_size, int_size = np.maximum(pyramid_sizes(n), normal_lcp_sizes(n)).tolist()
     f, i = np.float64, np.int64
@@ -126,5 +126,5 @@ def make_workspace(
 
 
 def body_records(scratch) -> np.ndarray:
-    """The records of `body_fields` in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
+    """Records of `body_fields` in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
     return getattr(getattr(scratch, "bodies", scratch), "work", scratch)

@@ -1,4 +1,4 @@
-"""Hard cases: a known outcome, and a run that holds the engine against it."""
+"""Hard cases: each has a known outcome, and a run that compares the engine with it."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ AT_MOST, AT_LEAST, WITHIN = "at most", "at least", "within"
 
 
 class UnsupportedError(Exception):
-    """A case cannot be expressed at this setting; the message says why. Never a pass."""
+    """Error of a case that cannot be expressed at a setting; the message says why. It never counts as a pass."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One number that came out, and what it must obey.
+    """One number of an outcome, and the condition that it must obey.
 
     Parameters
     ----------
@@ -55,19 +55,19 @@ class Check:
 
     @property
     def passes(self) -> bool:
-        """True if the value obeys; NaN never does."""
+        """True if the value obeys its condition; NaN never does."""
         if self.kind == AT_LEAST:
             return self.value >= self.limit
         return self.distance <= self.limit
 
     @property
     def distance(self) -> float:
-        """Distance that is compared with the limit, in the unit of the value."""
+        """Number that is compared with the limit: the distance from the expected value, or the value itself."""
         return abs(self.value - self.expected) if self.kind == WITHIN else self.value
 
     @property
     def margin(self) -> float:
-        """Share of the limit that is left: 1 nothing used, 0 just passes, negative fails; -inf where not finite.
+        """Unused share of the limit: 1 for no error, 0 at the limit, negative beyond it; -inf if not finite.
 
         For ``at least``: by how much of the limit the value is above it. A limit of 0 leaves 1 (met) or -inf.
         """
@@ -90,13 +90,13 @@ def at_least(what: str, value: float, limit: float, unit: str = "") -> Check:
 
 
 def none_of(what: str, wrong: int | bool) -> Check:
-    """Check that something has never happened: `wrong` counts how often it has."""
+    """Check that a count of faults, `wrong`, is 0."""
     return Check(what, float(wrong), 0.0)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """With what a case is run.
+    """Accuracy, step and engine with which a case is run.
 
     Parameters
     ----------
@@ -144,17 +144,17 @@ class Setting:
 
     @property
     def is_ours(self) -> bool:
-        """True if the engine is ours: only then there are reports, contact forces and parameters to look at."""
+        """True for our own engine, which has reports, contact forces and parameters to check."""
         return self.maker is None
 
     @property
     def tolerance(self) -> float:
-        """`Accuracy.tolerance`: residual of a contact problem by the free contact speed; the same for other engines."""
+        """`Accuracy.tolerance`, relative to the free contact speed; the same for other engines."""
         return resolve(self.accuracy).tolerance
 
     @property
     def slop(self) -> float:
-        """`Accuracy.slop`: gap that counts as none, in bounding radii; the same for other engines."""
+        """`Accuracy.slop`, the gap that counts as none, in bounding radii; the same for other engines."""
         return resolve(self.accuracy).slop
 
     def steps(self, duration: float) -> int:
@@ -162,7 +162,7 @@ class Setting:
         return max(1, math.ceil(duration / self.dt * (1 - 4 * np.finfo(float).eps)))
 
     def pick(self, thorough, quick):
-        """The first where the run is thorough, else the second."""
+        """Return the first value in a thorough run, else the second."""
         return thorough if self.is_thorough else quick
 
 

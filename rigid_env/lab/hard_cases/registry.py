@@ -1,4 +1,4 @@
-"""All hard cases, in the order of their numbers, and how they are found by number or name."""
+"""All hard cases in the order of their numbers, and a search by number or name."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CASES = _gathered()
 
 
 def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:
-    """The cases of these names or numbers, in the order of the list; none named: all.
+    """Cases of these names or numbers, in the order of the list; all if none is named.
 
     Raises
     ------

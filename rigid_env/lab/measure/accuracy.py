@@ -1,4 +1,4 @@
-"""Error against time of known scenes, beside other engines: what `rigid-env accuracy` and `benchmarks.accuracy` run."""
+"""Measure error against time of known scenes, for `rigid-env accuracy` and `benchmarks.accuracy`."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ QUICK = Ladder(steps=STEPS[:2], peer_steps=STEPS[:1], repeats=1)
 
 @dataclass(frozen=True)
 class Job:
-    """A scene, and who is measured on it.
+    """A scene, and the contenders that are measured on it.
 
     Attributes
     ----------
@@ -77,19 +77,19 @@ class Job:
 
     @property
     def goals(self) -> tuple[tuple[float, float], ...]:
-        """(error, µs per simulated second) to be reached together."""
+        """Goals (error, µs per simulated second), each pair to be reached by one setting."""
         return self.case.goals if self.case else ()
 
 
 @dataclass(frozen=True)
 class Found:
-    """A job and what came of it."""
+    """A job and its measurements."""
 
     job: Job
     frontier: physics.Frontier
 
     def goals_met(self) -> list[tuple[float, float, physics.FrontierPoint | None]]:
-        """For each goal (error, µs): our quickest setting that reaches it, or None."""
+        """Quickest setting of ours that reaches each goal (error, µs), or None."""
         met = []
         for error, us in self.job.goals:
             point = self.frontier.cheapest(error, engine=OURS)
@@ -97,7 +97,7 @@ class Found:
         return met
 
     def to_dict(self) -> dict:
-        """For JSON: the scene, and its points as rows."""
+        """Scene and points as rows, ready for JSON."""
         content = self.frontier.to_dict()
         goals = [
             {"error": error, "us": us, "reached_by": None if point is None else str(point)}
@@ -115,7 +115,7 @@ class Found:
 
 
 def names() -> list[str]:
-    """Every scene that can be measured: those with a closed form first.
+    """Names of all scenes that can be measured, those with a closed form first.
 
     Not those of several bodies that touch each other: the event-driven presets, truth of all others, do not know them.
     """
@@ -125,7 +125,7 @@ def names() -> list[str]:
 
 
 def load_peers(wanted: Sequence[str]) -> tuple[dict[str, peers.Engine], list[str]]:
-    """The peers of these names that are installed, and what to say about the others.
+    """Return the installed peers of these names, and a message about the missing ones.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def make_jobs(
     ladder: Ladder | None = None,
     duration: float | None = None,
 ) -> list[Job]:
-    """Scenes, ready to be measured.
+    """Prepare scenes for their measurement.
 
     Parameters
     ----------
@@ -174,12 +174,12 @@ def make_jobs(
 
 
 def run_count(jobs: Sequence[Job], ladder: Ladder) -> int:
-    """Number of calls of `tick` by `run`, if it is not interrupted."""
+    """Number of calls of `tick` by an uninterrupted `run`."""
     return sum(1 + len(job.contenders) * (1 + ladder.repeats) for job in jobs)
 
 
 def run(jobs: Sequence[Job], ladder: Ladder, tick: Tick = lambda what: None) -> Iterator[Found]:
-    """Measure jobs one by one; an interruption ends it after what was done of the current one."""
+    """Measure jobs one by one; an interruption ends the run after the finished part of the current job."""
     for job in jobs:
         truth = job.case.truth() if job.case else None
 

@@ -14,7 +14,7 @@ COLUMNS = 3
 
 
 def write_plot(results: Sequence[Found], path: str | Path, has_goals: bool = False) -> None:
-    """Draw the results into a file whose name says the format (png, svg, pdf); our own goals only on request.
+    """Draw the results into a file whose ending gives the format (png, svg, pdf); our own goals only on request.
 
     Raises
     ------

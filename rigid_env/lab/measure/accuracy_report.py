@@ -62,7 +62,7 @@ def measure_and_show(
     duration: float | None = None,
     shown: Shown | None = None,
 ) -> Report:
-    """Measure scenes and print a table of each as soon as it is there.
+    """Measure scenes, and print the table of each once it is measured.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def make_table(found: Found, is_full: bool = False) -> Table:
 
 
 def goals(found: Found) -> list[str]:
-    """Lines under a table: our goals for the scene, and which setting reaches each."""
+    """Lines under a table: our goals for the scene, and the setting that reaches each."""
     unit, lines = found.frontier.units[found.frontier.measure], []
     for error, us, point in found.goals_met():
         how = f"reached by {point} in {1e6 * point.cost:.0f} µs" if point else "not reached"
@@ -43,7 +43,7 @@ def goals(found: Found) -> list[str]:
 
 
 def summary(found: Found) -> list[str]:
-    """Lines under a table: what each of our settings does with the step, and who could not take part."""
+    """Lines under a table: dependence of each of our settings on the step, and peers that could not take part."""
     frontier, lines = found.frontier, []
     for engine, setting in frontier.families():
         if engine == OURS:
@@ -57,7 +57,7 @@ def summary(found: Found) -> list[str]:
 
 
 def answers(found: Found, error: float) -> list[str]:
-    """The cheapest setting below an error: ours, and with peers that of all."""
+    """Cheapest setting below an error: of ours, and with peers of all."""
     lines = [f"{found.job.key}, ours: {found.frontier.advice(error, engine=OURS)}"]
     if _has_peers(found):
         lines.append(f"{found.job.key}, all: {found.frontier.advice(error)}")
@@ -88,7 +88,7 @@ def _has_peers(found: Found) -> bool:
 
 
 def _own_fronts(frontier: physics.Frontier) -> list[physics.FrontierPoint]:
-    """Each engine's front, and of each setting its best: no engine and none of its settings vanishes."""
+    """Each engine's front, and the best point of each setting, so that every engine and setting is shown."""
     shown = [p for engine in dict.fromkeys(p.engine for p in frontier.points) for p in frontier.front(engine=engine)]
     for engine, setting in frontier.families():
         best = min(frontier.of(setting, engine), key=lambda p: (frontier.error(p), p.cost))

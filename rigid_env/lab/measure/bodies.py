@@ -1,4 +1,4 @@
-"""Worlds of many bodies, ours and MuJoCo's: steps per second, and how deep bodies sink into each other meanwhile."""
+"""Worlds of many bodies, ours and MuJoCo's: steps per second, and the depth of bodies in each other."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigid_env.lab.measure.workloads import STEP
 
 @dataclass(frozen=True)
 class Case:
-    """A scene from its start over some steps.
+    """A scene, and the number of steps from its start.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Case:
 
 
 def cases(is_quick: bool) -> dict[str, Case]:
-    """The cases by name; `is_quick`: few steps, to see that it runs."""
+    """Cases by name; `is_quick` has few steps, for tests."""
     return {
         "stack": Case("a stack of 10 blocks", scenes.tower(10), 10 if is_quick else 1000, 4.0),
         "heap": Case("100 cubes settle, 5 s", scenes.heap(100), 3 if is_quick else 1000, 3.0),
@@ -44,7 +44,7 @@ def cases(is_quick: bool) -> dict[str, Case]:
 
 
 class Ours:
-    """Our engine on a case; calling it runs the case once and returns steps per second."""
+    """Our engine on a case; a call runs the case once and returns steps per second."""
 
     def __init__(self, case: Case, accuracy: str):
         self.world = physics.World(case.scene, dt=STEP, accuracy=accuracy)
@@ -57,7 +57,7 @@ class Ours:
         return self.steps / watch.seconds
 
     def notes(self) -> dict:
-        """Deepest penetration of the last run [m], in its second half too, unconverged solves, and where it ended."""
+        """Deepest penetration [m] of the last run and of its second half, unconverged solves, and final positions."""
         self.world.restore(self.start)
         first = self.world.step(steps=self.steps - self.steps // 2)
         second = self.world.step(steps=max(1, self.steps // 2))
@@ -86,7 +86,7 @@ class Theirs:
         return self.steps / watch.seconds
 
     def notes(self) -> dict:
-        """As `Ours.notes`, seen after every step."""
+        """As `Ours.notes`, observed after every step."""
         self.run.restart()
         depths = []
         for _ in range(self.steps):
@@ -103,7 +103,7 @@ def run_count(repeats: int, with_peer: bool) -> int:
 
 
 def body_rows(is_quick: bool, repeats: int, with_peer: bool, tick: Tick | None = None) -> Iterator[list[Row]]:
-    """Measure every case, ours and MuJoCo's in turns; yields the rows of each as soon as they are there.
+    """Measure every case, ours and MuJoCo's in turns; yield the rows of each once they are measured.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def body_rows(is_quick: bool, repeats: int, with_peer: bool, tick: Tick | None =
     with_peer : bool
         Whether MuJoCo is measured too.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for key, case in cases(is_quick).items():
         runners = {accuracy: Ours(case, accuracy) for accuracy in ACCURACIES}
@@ -129,7 +129,7 @@ def body_rows(is_quick: bool, repeats: int, with_peer: bool, tick: Tick | None =
 
 
 def _no_deeper(row: Row) -> Row:
-    """A row passes only at no larger penetration than the peer's, after the start."""
+    """Let a row pass only if its penetration after the start is at most the peer's."""
     if row.peer is None:
         return row
     return Row(**{**vars(row), "is_valid": row.notes["penetration_late"] <= row.notes["peer"]["penetration_late"]})

@@ -1,4 +1,4 @@
-"""Two threads against one on a machine that other programs use too: rows of a throughput table.
+"""Measure two threads against one while other programs use the machine: rows of a throughput table.
 
 A ratio compares both under the same load, turn by turn. A busy process is an endless loop in Python; its niceness says
 how much it leaves to others.
@@ -29,7 +29,7 @@ SETTLING = 0.3  # from the start of busy processes until something is measured [
 
 @dataclass(frozen=True)
 class Load:
-    """Busy processes beside the one that is measured.
+    """Number and priority of busy processes beside the measured one.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ LOADS = (Load(0, 0, 1.8), *(Load(busy, nice, 0.95) for busy in (1, 2) for nice i
 
 @contextmanager
 def beside(load: Load):
-    """Run the busy processes of a load meanwhile."""
+    """Run the busy processes of a load during the block."""
     command = f"import os\nif {load.nice}: os.nice({load.nice})\nwhile True: pass"
     processes = []
     try:
@@ -82,7 +82,7 @@ def crowded_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None 
     with_peer : bool
         Whether the same ratio of MuJoCo's rollout is noted.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     longer = replace(sizes, batch_steps=LONGER * sizes.batch_steps)
     runners = {name: workloads.Batch(ACCURACY, replace(longer, threads=k)) for k, name in ((1, ONE), (2, TWO))}
@@ -102,7 +102,7 @@ def run_count(repeats: int, with_peer: bool) -> int:
 
 
 def _loads() -> list[Load]:
-    """Those that the system knows: Windows has no niceness."""
+    """Loads that the system supports: Windows has no niceness."""
     return [load for load in LOADS if not load.nice or hasattr(os, "nice")]
 
 

@@ -1,4 +1,4 @@
-"""Worlds with drawn effects: no energy from nowhere, whatever the parameters and the step.
+"""Worlds with drawn effects: check that no parameter and no step creates energy.
 
 Each draw is a scene of a sphere, a block and an ellipsoid that do not meet, in flight or on a floor, with one effect
 of the catalogue or two; parameters are drawn over twelve decades about their defaults, the step from 1 ms to 0.1 s.
@@ -65,7 +65,7 @@ def _spring(rng: np.random.Generator, other: int | None) -> physics.Spring:
 
 
 def _push(rng: np.random.Generator) -> physics.Push:
-    """A push whose torque is at most about 1 N m: what spins at 10⁶ rad/s is right, but takes its time."""
+    """Draw a push whose torque is at most about 1 N m: a body that spins at 10⁶ rad/s is right, but slow to compute."""
     force = _decades(rng, 10.0)
     point = rng.normal(size=3) * min(0.3, 1.0 / force)
     return physics.Push(tuple(force * _direction(rng)), tuple(point), str(rng.choice(["world", "body"])))
@@ -125,13 +125,13 @@ class Outcome:
 
 
 def pairs() -> list[tuple[str, ...]]:
-    """Every effect, and every two."""
+    """Every effect, and every pair of effects."""
     names = [*EFFECTS, *ON_FLOOR]
     return [(a,) for a in names] + [(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
 
 
 def draw_scene(rng: np.random.Generator, names: tuple[str, ...], on_floor: bool) -> physics.Scene | None:
-    """A scene with these effects; None where they cannot be had together, or not in flight."""
+    """Draw a scene with these effects; None where they exclude each other, or do not act in flight."""
     if not on_floor and any(name in ON_FLOOR for name in names):
         return None
     found: dict[type, object] = {}
@@ -165,7 +165,7 @@ def _shapes(rng: np.random.Generator) -> list[tuple[type, dict]]:
 
 
 def run(rng: np.random.Generator, scene: physics.Scene, accuracy: str, worlds: int) -> Outcome:
-    """Step some worlds of a scene, each with starts and wrenches of its own, and hold their energy to the law."""
+    """Step some worlds of a scene, each with its own starts and wrenches, and check their energy."""
     dt = 10.0 ** rng.uniform(-3.0, -1.0)
     world = physics.World(scene, worlds=worlds, dt=dt, accuracy=accuracy)
     world.set_state(
@@ -191,7 +191,7 @@ def _wrenches(rng: np.random.Generator, scene: physics.Scene, worlds: int) -> np
 
 
 class EnergyLaw:
-    """The bound of the module for the worlds of one scene, step by step."""
+    """Bound of the energy for the worlds of one scene, step by step; see the module."""
 
     def __init__(self, world: physics.World, scene: physics.Scene, wrench: np.ndarray):
         self.world = world
@@ -228,7 +228,7 @@ class EnergyLaw:
         return self.world.dt * np.sqrt(force**2 / self.mass + torque**2 * self.J)
 
     def _air(self, scene) -> tuple[np.ndarray, np.ndarray, float]:
-        """κ of the drag at twice the speed of the air (bodies,), lift by spin and speed (bodies,), speed of the air."""
+        """Drag κ at twice the air's speed (bodies,), lift by spin and speed (bodies,), and the air's speed."""
         wind, drag, magnus = (scene.effect(kind) for kind in (physics.Wind, physics.Drag, physics.Magnus))
         speed = 0.0
         if wind is not None:
@@ -250,7 +250,7 @@ class EnergyLaw:
         return now.potential_energy.sum(axis=1) - self._gravity(now)
 
     def add_step(self) -> None:
-        """Add what a step may have done, and look at the energy after it."""
+        """Add the largest gain that a step may have, and compare the energy after it."""
         now, h = physics.diagnose(self.world), self.world.dt
         kinetic = np.maximum(self.kinetic, now.kinetic_energy)
         gained = self.kick * np.sqrt(2 * kinetic) + self.kick**2
@@ -273,7 +273,7 @@ class EnergyLaw:
 
 
 def _reach(body) -> float:
-    """Radius of a sphere around it [m]."""
+    """Radius of a sphere around the body [m]."""
     for name in ("radius", "semi_axes", "size"):
         if hasattr(body, name):
             value = np.max(getattr(body, name))

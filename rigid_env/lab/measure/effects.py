@@ -39,7 +39,7 @@ def _flying() -> physics.Body:
 
 
 def _case(effect, *others, bodies=None, walls=()) -> tuple[physics.Scene, physics.Scene]:
-    """Bodies with the effect and without, and with `others` in both; one in flight if none are given."""
+    """Make scenes of bodies with and without the effect, both with `others`; one body in flight by default."""
     bodies = bodies or [_flying()]
     return tuple(physics.Scene(bodies, walls, [*others, *extra]) for extra in ((effect,), ()))
 
@@ -69,7 +69,7 @@ def _pair() -> list[physics.Body]:
 
 
 def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
-    """The block at rest with an effect of contact and without it: without `Contact` it falls."""
+    """Block at rest with and without an effect of contact; it falls without `Contact`."""
     scene = scenes.rest()
     gone = {physics.Contact: (physics.Contact, physics.Friction)}.get(kind, (kind,))
     without = [effect for effect in scene.effects if not isinstance(effect, gone)]
@@ -77,7 +77,7 @@ def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
 
 
 def _resting() -> tuple[physics.Scene, physics.Scene]:
-    """The block at rest, which sleeps after a second and a half, and one that never does."""
+    """Block at rest that sleeps after a second and a half, and one that never does."""
     scene = scenes.rest()
     return physics.Scene(scene.bodies, scene.walls, [*scene.effects, physics.Sleeping()]), scene
 
@@ -120,7 +120,7 @@ class Steps:
 
 
 def bytes_per_body(world: physics.World) -> int:
-    """Bytes of parameters, and of what is kept of its sleep, that a world stores per body."""
+    """Bytes of parameters, and of the state of sleep, that a world stores per body."""
     return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
 
 

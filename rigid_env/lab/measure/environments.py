@@ -1,4 +1,4 @@
-"""The work that environments are given: random actions, resets included; environment steps per second."""
+"""Measure environments with random actions, resets included: environment steps per second."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class EnvPeer:
-    """Another implementation to compare with: its name and how its environments are made.
+    """Another implementation for comparison: its name, and a maker of its environments.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ def environment_rows(
         Of every contestant, in turns.
     peer : EnvPeer, optional
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for threads in THREADS:
         yield _vector_rows(threads, sizes, repeats, peer, tick)

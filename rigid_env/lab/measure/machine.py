@@ -1,4 +1,4 @@
-"""Machine and versions with which a number was measured: no result without them."""
+"""Machine and versions of a measurement; every result contains them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def describe() -> dict:
 
 
 def processor() -> str:
-    """Name of the processor, as the system tells it."""
+    """Name of the processor, from the system."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
@@ -79,7 +79,7 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def write_json(path: str | Path, content: dict) -> None:
-    """Write a result, with the machine in it under ``machine``; folders are made as needed."""
+    """Write a result as JSON, with the machine under ``machine``; missing folders are made."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**content, "machine": describe()}, indent=2, allow_nan=False)

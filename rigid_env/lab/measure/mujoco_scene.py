@@ -37,7 +37,7 @@ def is_installed() -> bool:
 
 @contextlib.contextmanager
 def elsewhere():
-    """Work in a temporary folder, where MuJoCo may leave its log."""
+    """Work in a temporary folder during the block, where MuJoCo may leave its log."""
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -181,7 +181,7 @@ class Batch:
 
 
 class Rollout:
-    """As `workloads.Batch`, with `mujoco.rollout`: all wrenches are handed over at once, its quickest way."""
+    """As `workloads.Batch`, with `mujoco.rollout`, MuJoCo's quickest way: it gets all wrenches at once."""
 
     def __init__(self, sizes: Sizes, landed: tuple[np.ndarray, np.ndarray]):
         import mujoco

@@ -8,7 +8,7 @@ PURPOSE = "a plot"
 
 
 def require_matplotlib() -> None:
-    """Say what to install, before anything is measured.
+    """Raise an error with the line that installs matplotlib, before a measurement.
 
     Raises
     ------
@@ -19,5 +19,5 @@ def require_matplotlib() -> None:
 
 
 def lacks_matplotlib() -> str:
-    """The same message; "" where matplotlib is installed."""
+    """Line that installs matplotlib; "" where it is installed."""
     return lacking("plot", "matplotlib", purpose=PURPOSE)

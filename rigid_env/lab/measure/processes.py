@@ -1,4 +1,4 @@
-"""Processes that end in any case: after a while by a signal that no process can ignore.
+"""Run processes with a time limit: after it a signal that no process can ignore ends them.
 
 A process that was started in the background ignores SIGINT, and hands that on to all that it starts.
 """
@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 PATIENCE = 900.0
-"""Time that an answer of another process may take [s]; compiling all kernels of a scene takes a minute or two."""
+"""Time limit for an answer of another process [s]; compiling all kernels of a scene takes a minute or two."""
 
 ENDING = 30.0
-"""Time that a process may take to end once it was told to [s]."""
+"""Time limit for the end of a process after it was told to end [s]."""
 
 
 @contextmanager
 def killed_after(process: subprocess.Popen, patience: float = PATIENCE) -> Iterator[None]:
-    """Kill a process if the block takes longer than `patience` [s]: waiting for its output or its end then ends, too.
+    """Kill a process if the block takes longer than `patience` [s], which also ends waiting for its output or its end.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def killed_after(process: subprocess.Popen, patience: float = PATIENCE) -> Itera
 
 
 def wait_for_end(process: subprocess.Popen, patience: float = ENDING) -> int:
-    """Wait for the end of a process that was told to; returns its exit status.
+    """Wait for the end of a process that was told to end; return its exit status.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Pairs of the same work for our engine and MuJoCo, measured in turns: the rows of a throughput table."""
+"""Measure the same work in our engine and MuJoCo, in turns: the rows of a throughput table."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Tick = Callable[[str], None]
 
 
 def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None = None) -> Iterator[list[Row]]:
-    """Measure flight, rest, shoves and the batch; yields the rows of each as soon as they are there.
+    """Measure flight, rest, shoves and the batch; yield the rows of each once they are measured.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
     with_peer : bool
         Whether MuJoCo is measured too.
     tick : callable, optional
-        Told before each run what is measured.
+        Called before each run with its name.
     """
     for key in SINGLE:
         yield _single_rows(key, sizes, repeats, with_peer, tick)
@@ -43,7 +43,7 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
 
 
 def paired_rows(spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common) -> list[Row]:
-    """One row for each of our contestants (named by their accuracy), all against the fastest of the peers.
+    """Make one row for each of our contestants (named by accuracy), each against the fastest peer.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def run_count(repeats: int, with_peer: bool) -> int:
 
 
 def told(tick: Tick | None, what: str) -> Tick | None:
-    """`tick` that puts `what` before the contestant's name."""
+    """Make a `tick` that puts `what` before the contestant's name."""
     return None if tick is None else lambda name: tick(f"{what}: {name}")
 
 

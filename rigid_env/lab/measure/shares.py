@@ -42,7 +42,7 @@ class Share:
 
     @property
     def is_seen(self) -> bool:
-        """True if the time is above the noise: of one sign in every turn."""
+        """True if the time is above the noise: it has the same sign in every turn."""
         return self.time.lowest > 0 or self.time.highest < 0
 
     def to_dict(self) -> dict:
@@ -51,7 +51,7 @@ class Share:
 
 
 def without(scene: physics.Scene, effect) -> physics.Scene:
-    """The scene without one of its effects, and without those that need it."""
+    """The scene without one of its effects, and without those that depend on it."""
     left = [other for other in scene.effects if other is not effect]
     needs_contact = (physics.Friction, physics.RollingFriction, physics.SpinFriction, physics.Sleeping)
     if isinstance(effect, physics.Contact):
@@ -67,13 +67,13 @@ def without(scene: physics.Scene, effect) -> physics.Scene:
 
 
 def names_of(scene: physics.Scene) -> list[str]:
-    """A name for each effect of a scene: its class, with a number where there are several."""
+    """Names of a scene's effects: their classes, with a number where there are several."""
     kinds = [type(effect).__name__ for effect in scene.effects]
     return [f"{kind} {kinds[:k].count(kind) + 1}" if kinds.count(kind) > 1 else kind for k, kind in enumerate(kinds)]
 
 
 def acted_shares(world: physics.World, others: list[physics.World], steps: int) -> list[float]:
-    """Share of the steps of `world` in which each of the `others`, from the same state, ends elsewhere."""
+    """For each of the `others`, share of the steps of `world` that end in another state without the effect."""
     acted = np.zeros(len(others))
     for _ in range(steps):
         before, time = world.state.copy(), world.time
@@ -91,7 +91,7 @@ def acted_shares(world: physics.World, others: list[physics.World], steps: int) 
 
 
 class _Run:
-    """Seconds of a world's steps, one call each, from its start."""
+    """Time of a world's steps from its start, one call each [s]."""
 
     def __init__(self, world: physics.World, steps: int):
         self.world, self.steps, self.start = world, steps, world.snapshot()
@@ -144,7 +144,7 @@ def measure(
 
 
 def make_table(shares: list[Share], title: str) -> Table:
-    """Effect, share of the steps in which it acted, share of the time: median and range."""
+    """Table of effects: share of the steps in which each acted, and share of the time, as median and range."""
     table = Table([Column("effect"), *number_columns("acted in", "of the time")], title)
     for share in shares:
         time = f"{share.time.median:.1%}" if share.is_seen else "below noise"

@@ -12,7 +12,7 @@ VERDICTS = {None: Text("-"), True: Text("yes", style="green"), False: Text("no",
 
 
 def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "peer")) -> Table:
-    """Table of measurements: both `sides`, ratio (each the median over the range), target, and verdict."""
+    """Table of measurements: both `sides` and their ratio (each as median over range), target, and verdict."""
     columns = [Column("what"), Column("accuracy", is_whole=True, under="what")]
     columns += [*number_columns(*sides, "ratio", "target"), Column("pass", is_whole=True)]
     table = Table(columns, title)

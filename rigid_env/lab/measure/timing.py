@@ -1,4 +1,4 @@
-"""Repeats, medians and ratios: how two things are compared on a machine that others use too."""
+"""Repeats, medians and ratios: compare two things on a machine that others use, too."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class Row:
 
     @property
     def is_passed(self) -> bool | None:
-        """True if the target is reached; None where there is none, or no peer to compare with."""
+        """True if the target is reached; None without a target or a peer."""
         if self.target is None or (self.is_ratio and self.peer is None):
             return None
         if not self.is_valid:
@@ -138,12 +138,12 @@ def interleave(
 
 
 def fastest(spreads: dict[str, Spread], names: Sequence[str]) -> str:
-    """Name of the highest median among `names`."""
+    """Name with the highest median among `names`."""
     return max(names, key=lambda name: spreads[name].median)
 
 
 class Stopwatch:
-    """Adds up the time of the parts of a run that count.
+    """Sum of the times of the parts of a run that count.
 
     Use it as ``with watch: ...`` around each part; `seconds` is their sum [s].
     """

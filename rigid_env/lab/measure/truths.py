@@ -1,4 +1,4 @@
-"""Scenes whose outcome is known, and how far from it a simulation ends: for `rigid-env accuracy`.
+"""Scenes with known outcomes, and the error of a simulation against each, for `rigid-env accuracy`.
 
 The truths are closed forms of the course notes' physics, but for the free rotation, which SciPy's DOP853 integrates
 at two tolerances; their difference is the truth's own error.
@@ -38,7 +38,7 @@ class Path:
 
     @classmethod
     def of(cls, trajectory: physics.Trajectory) -> Path:
-        """The first body of a trajectory."""
+        """Path of the first body of a trajectory."""
         columns = ("pos", "quat", "linvel", "angvel")
         return cls(trajectory.t, *(getattr(trajectory, name)[:, 0] for name in columns), trajectory.events)
 
@@ -50,7 +50,7 @@ class Case:
     Attributes
     ----------
     key, what : str
-        Name for programs, and for people what the error is of.
+        Name for programs, and description of the error for people.
     unit : str
         Of the error.
     duration : float
@@ -62,7 +62,7 @@ class Case:
     goals : tuple of (error, microseconds)
         To be reached by one setting each: error, and wall-clock time per simulated second.
     scale : float, optional
-        Size of what happens, in `unit`: an error larger than half of it is no likeness any more. None: nothing happens.
+        Size of the motion, in `unit`; an error larger than half of it counts as lost. None: nothing moves.
     own_error : callable
         () -> error of the truth itself, in `unit`. Rounding of a closed form does not count.
     """
@@ -78,7 +78,7 @@ class Case:
     own_error: Callable[[], float] = float
 
     def truth(self) -> physics.Truth:
-        """For `physics.frontier`."""
+        """Truth for `physics.frontier`."""
         own = self.own_error()
         text = "DOP853 at two tolerances" if own else "closed form"
         return physics.Truth(lambda seen: self.error(Path.of(seen)), self.unit, own, self.scale, text)
@@ -114,7 +114,7 @@ def angle_between(q, p) -> float:
 
 
 def truth_error(spin: tuple[float, float, float], duration: float) -> float:
-    """Error of `free_attitude`, from a tolerance ten times as large [rad]."""
+    """Own error of `free_attitude` [rad], by comparison with a tolerance ten times as large."""
     return angle_between(free_attitude(spin, duration), free_attitude(spin, duration, 1e-12))
 
 
@@ -142,7 +142,7 @@ def flights(path: Path) -> list[tuple[float, float]]:
 
 
 def elastic_error(path: Path, bounces: int = 10) -> float:
-    """Worst of the apex heights [m] and the times [s] of the first bounces; infinite when there are fewer."""
+    """Largest error of the apex heights [m] and times [s] of the first bounces; infinite if there are fewer."""
     found = flights(path)[:bounces]
     if len(found) < bounces:
         return math.inf
@@ -151,7 +151,7 @@ def elastic_error(path: Path, bounces: int = 10) -> float:
 
 
 def damped_error(path: Path) -> float:
-    """Worst of the first apex, e² h [m], and of the time to rest, √(2h/g) (1 + e)/(1 - e) [s]."""
+    """Larger error of the first apex, e² h [m], and of the time to rest, √(2h/g) (1 + e)/(1 - e) [s]."""
     found, rest = flights(path), time_of_rest(path)
     if not found:
         return math.inf
@@ -163,7 +163,7 @@ RESTLESS = 1e-2  # speed at the end above which a block is not at rest at all [m
 
 
 def time_of_rest(path: Path) -> float:
-    """When the block came to rest [s]: by its event, else the first sample from which on it stays still on the floor.
+    """Time at which the block came to rest [s]: that of its event, else of the first sample after which it stays still.
 
     Infinite where it never does.
 
@@ -199,7 +199,7 @@ def lowest_vertex() -> tuple[np.ndarray, np.ndarray]:
 
 
 def vertex_scene() -> physics.Scene:
-    """The tilted block flies onto a floor without gravity: its lowest vertex arrives at `LANDING_TIME`."""
+    """Scene of the tilted block, without gravity: its lowest vertex arrives at the floor at `LANDING_TIME`."""
     arm, _ = lowest_vertex()
     start = (0.0, LANDING_TIME * LANDING_SPEED - arm[1], 0.0)
     body = physics.Block(scenes.SIZE, scenes.MASS, pos=start, quat=TILT, linvel=(0, -LANDING_SPEED, 0))
@@ -207,7 +207,7 @@ def vertex_scene() -> physics.Scene:
 
 
 def vertex_error(path: Path) -> float:
-    """Error of the vertex's velocity just after the impact [m/s], from the momentum that it left.
+    """Error of the vertex's velocity just after the impact [m/s], from the momentum after it.
 
     j = (1 + e) v / w with w = 1/m + (r x n)·I⁻¹ (r x n): the vertex then leaves at e v, and an error of j makes one of
     w times itself in that.
@@ -235,7 +235,7 @@ def slipping_error(path: Path) -> float:
 
 
 def sphere_error(path: Path) -> float:
-    """Worst of the final speed, 5/7 v [m/s], and of the distance [m]: it slips until t = 2 v/(7 μ g), then rolls."""
+    """Larger error of the sphere's final speed, 5/7 v [m/s], and distance [m]; it slips until t = 2 v/(7 μ g)."""
     v, mu = 5.0, 0.2
     slip = 2.0 * v / (7.0 * mu * G)
     way = v * slip - 0.5 * mu * G * slip**2 + 5.0 / 7.0 * v * (path.t[-1] - slip)

@@ -1,4 +1,4 @@
-"""The work that our engine is given: calling an object does it once and returns steps per second.
+"""Workloads of our engine: a call of one does the work once and returns steps per second.
 
 `mujoco_scene` has the same work under the same names for MuJoCo.
 """

@@ -1,4 +1,4 @@
-"""Measured cube tosses: reading them, and dividing them into those to fit and the rest.
+"""Measured cube tosses: read them, and split them into a part for the fit and the rest.
 
 Two formats are read. Both are of the public ContactNets data set (Pfrommer, Halm and Posa, *ContactNets: Learning
 Discontinuous Contact Dynamics with Smooth, Implicit Representations*, CoRL 2020):

@@ -1,9 +1,9 @@
-"""Fitting the cube's parameters to measured tosses: the same parameters for all of them.
+"""Fit the cube's parameters to measured tosses, one set of parameters for all.
 
-What is minimised is the mean over tosses and frames of the position error in cube widths plus half the rotation error
-in radians: a turn by θ moves the middle of a face by θ/2 cube widths. Which face a cube lands on hangs on a hair in
-some tosses, so that this mean jumps with the parameters; it is therefore averaged over the start as measured and some
-starts disturbed by the measurement's noise (`flight.disturb`), the same ones in every evaluation.
+The fit minimises the mean over tosses and frames of the position error in cube widths plus half the rotation error in
+radians: a turn by θ moves the middle of a face by θ/2 cube widths. Which face a cube lands on hangs on a hair in some
+tosses, so that this mean jumps with the parameters; it is therefore averaged over the start as measured and some starts
+disturbed by the measurement's noise (`flight.disturb`), the same ones in every evaluation.
 
 The search: points drawn in the box of the parameters, then Nelder and Mead's simplex from the best of them.
 """
@@ -61,7 +61,7 @@ class Effort:
     seed: int = 1
 
     def evaluations(self, parameters: int) -> int:
-        """At most, for so many parameters."""
+        """Largest number of evaluations for so many parameters."""
         return parameters * (self.drawn + REFINED * self.refining)
 
 
@@ -173,7 +173,7 @@ class _Search:
         return found
 
     def run(self, effort: Effort) -> None:
-        """Draw, then refine."""
+        """Draw points at random, then refine the best."""
         size = len(self.names)
         points = np.random.default_rng(effort.seed).random((size * effort.drawn, size))
         order = np.argsort([self(point) for point in points], kind="stable")
@@ -190,12 +190,12 @@ def fit(
     tick: Callable[[float], None] = lambda best: None,
     nominal: Cube = NOMINAL,
 ) -> Fit:
-    """Search the parameters `names` for the least `objective`; ``tick`` is told the best so far after each evaluation.
+    """Search the parameters `names` with the least `objective`; ``tick`` gets the best so far after each evaluation.
 
-    What is not fitted is as in `nominal`.
+    Other parameters are those of `nominal`.
 
-    Ctrl-C ends the search; what was best until then is returned, marked as not complete. Before the first evaluation
-    has ended there is nothing to return, and the interrupt goes on.
+    Ctrl-C ends the search; the best so far is returned, marked as incomplete. Before the end of the first evaluation
+    there is no result, and the interrupt is raised.
     """
     search = _Search(objective, check_names(names), tick, nominal)
     is_complete = True

@@ -1,4 +1,4 @@
-"""First flights of the tosses, before any contact: what they say about the measurement and the cube.
+"""First flights of the tosses, before any contact: they measure gravity, noise and the cube.
 
 In flight the centre of mass follows a parabola and nothing of the contact model acts. So the first flights of the
 tosses to fit give the scale of the recorded lengths, the noise of the first frame (how far its velocities are from
@@ -24,7 +24,7 @@ REST_SHARE = 0.05  # of the last frames of a toss, in which it is at rest
 
 @dataclass(frozen=True)
 class Flight:
-    """Measured from the flights.
+    """Quantities measured from the flights.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Flight:
 
 
 def rest_scale(tosses: Tosses) -> float:
-    """True length per recorded length: half the nominal side over the median height of the cube's centre at rest."""
+    """Ratio of true to recorded lengths: half the nominal side over the median height of the resting cube's centre."""
     heights = [np.median(toss[-max(1, round(REST_SHARE * len(toss))) :, 2]) for toss in tosses]
     return float(data.HALF_WIDTH / np.median(heights))
 
@@ -99,7 +99,7 @@ def _times(flight: np.ndarray) -> np.ndarray:
 
 
 def _equations(flight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (3 n, 4) for (s, g) and right sides (3 n,) of one flight, its own c and v projected out."""
+    """Rows (3 n, 4) for (s, g) and right sides (3 n,) of one flight, with its own c and v projected out."""
     t, R = _times(flight), attitude(flight[:, data.QUAT]).as_matrix()
     basis, _ = np.linalg.qr(np.stack([np.ones_like(t), t], axis=1))
     rows = np.zeros((3, len(t), 4))
@@ -111,7 +111,7 @@ def _equations(flight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _velocity_errors(flight: np.ndarray, gravity: float, offset: np.ndarray) -> np.ndarray:
-    """(6,) velocity and angular velocity of the first frame less those of the whole flight, world frame."""
+    """Velocity and angular velocity (6,) of the first frame minus those of the whole flight, world frame."""
     t, R = _times(flight), attitude(flight[:, data.QUAT])
     spin = ((R[1:] * R[:-1].inv()).as_rotvec() / SAMPLE_DT).mean(axis=0)
     center = flight[:, data.POS] - R.apply(offset)
@@ -121,7 +121,7 @@ def _velocity_errors(flight: np.ndarray, gravity: float, offset: np.ndarray) -> 
 
 
 def disturb(begin: Starts, flight: Flight, rng: np.random.Generator) -> Starts:
-    """Starts with other velocities that the measurement could as well have given: normal, with its noise."""
+    """Starts with velocities changed by normal random numbers of the measurement's noise."""
     linvel = begin.linvel + rng.normal(size=begin.linvel.shape) * flight.linvel_noise
     angvel = begin.angvel + rng.normal(size=begin.angvel.shape) * flight.angvel_noise
     return Starts(begin.pos, begin.quat, linvel, angvel)

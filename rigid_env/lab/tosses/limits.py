@@ -1,4 +1,4 @@
-"""Sources of the error of replayed tosses: the start's noise, the face they land on, the time when it grows."""
+"""Sources of error of replayed tosses: the start's noise, the face they land on, and growth over time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ALONG_PARTS = 20
 
 @dataclass(frozen=True)
 class Limits:
-    """Sources of the headline's error, over the tosses that were not fitted.
+    """Sources of the headline's error, over the tosses outside the fit.
 
     Attributes
     ----------

@@ -79,9 +79,9 @@ class Errors:
         return Errors(self.position[frames], self.rotation[frames], offsets)
 
     def along(self, parts: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean errors (parts,) against the share of the toss that is over, of `parts` equal shares.
+        """Mean errors (parts,) over a toss cut into `parts` equal shares of its time.
 
-        Of each toss a share counts by the mean of its frames, so that long tosses weigh as much as short ones.
+        Each share of a toss counts by the mean of its frames, so that long tosses weigh as much as short ones.
         """
         frames = np.diff(self.offsets)
         index = np.arange(len(self.position)) - np.repeat(self.offsets[:-1], frames)

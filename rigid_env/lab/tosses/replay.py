@@ -50,7 +50,7 @@ class Cube:
 
     @property
     def center_of_mass(self) -> np.ndarray:
-        """(3,) from the cube's centre, body frame [m]."""
+        """Centre of mass (3,) relative to the cube's centre, body frame [m]."""
         return np.array([self.heavy_x, self.heavy_y, self.heavy_z])
 
     def scene(self) -> physics.Scene:
@@ -69,7 +69,7 @@ class Cube:
 
 @dataclass(frozen=True)
 class Recording:
-    """Measurement model of the recorded numbers, without anything that differs from toss to toss.
+    """Measurement model of the recorded numbers, the same for all tosses.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Recording:
     is_midframe: bool = False
 
     def lengths(self, states: np.ndarray) -> np.ndarray:
-        """(frames, 13) recorded states in true lengths."""
+        """Recorded states (frames, 13) converted to true lengths."""
         scaled = states.copy()
         scaled[:, data.POS] *= self.length_scale
         scaled[:, data.LINVEL] *= self.length_scale
@@ -113,12 +113,12 @@ def attitude(quat: np.ndarray) -> Rotation:
 
 
 def corner_height(quat: np.ndarray, side: float) -> np.ndarray:
-    """(n,) how far the lowest corner of a cube is below its centre, z up [m]."""
+    """Depth (n,) of the lowest corner of a cube below its centre, z up [m]."""
     return 0.5 * side * np.abs(attitude(quat).as_matrix()[:, 2]).sum(axis=1)
 
 
 def starts(tosses: Tosses, cube: Cube, recording: Recording) -> Starts:
-    """The first frame of each toss, and nothing else of it."""
+    """First frame of each toss, the only one that enters a replay."""
     first = recording.lengths(tosses.first)
     quat, linvel = first[:, data.QUAT], first[:, data.LINVEL].copy()
     if recording.is_midframe:
@@ -127,14 +127,14 @@ def starts(tosses: Tosses, cube: Cube, recording: Recording) -> Starts:
 
 
 def sunken(begin: Starts, cube: Cube) -> np.ndarray:
-    """(tosses,) how deep the lowest corner starts under the table [m], 0 where it does not."""
+    """Depth (tosses,) of the lowest corner under the table at the start [m], 0 where it is above."""
     return np.maximum(cube.table - begin.pos[:, 2] + corner_height(begin.quat, cube.side), 0.0)
 
 
 def replay(
     lengths: np.ndarray, begin: Starts, cube: Cube, accuracy: Preset | physics.Accuracy = "balanced", threads: int = 1
 ) -> tuple[np.ndarray, float]:
-    """Simulate tosses from their starts and sample them as the recording does.
+    """Simulate tosses from their starts, and sample them at the times of the recording.
 
     A cube that starts under the table is lifted until it touches it (`sunken`): the engine refuses to start inside
     a wall.
@@ -190,7 +190,7 @@ def batches(lengths: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _watch(world: physics.World, frames: int) -> tuple[np.ndarray, float]:
-    """Poses (frames, worlds, 7) of a world from now on, and the wall-clock time of its steps [s]."""
+    """Poses (frames, worlds, 7) of a world from now on, and wall-clock time of its steps [s]."""
     step = physics.Stepper(world)
     table = np.empty((frames, world.worlds, 7))
     seconds = 0.0

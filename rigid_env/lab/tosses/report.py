@@ -1,4 +1,4 @@
-"""Everything that ``rigid-env tosses`` measures: fits, errors at each accuracy, and what limits them."""
+"""Measurements of ``rigid-env tosses``: fits, errors at each accuracy, and their limits."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PEERS = {"MuJoCo": (0.133, 19.5), "Drake": (0.135, 17.5), "PyBullet": (0.145, 16
 
 @dataclass(frozen=True)
 class Setup:
-    """One way to fit: which parameters, how the recording is read, and what the cube is in all else."""
+    """One way to fit: its parameters, the model of the recording, and the cube's other properties."""
 
     name: str
     parameters: tuple[str, ...]
@@ -75,7 +75,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Rung:
-    """The headline's parameters at one accuracy, over the tosses that were not fitted.
+    """Errors with the headline's parameters at one accuracy, over the tosses outside the fit.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Rung:
 
 @dataclass
 class Report:
-    """All of it; the lists fill as it is measured."""
+    """All measurements; the lists grow during a run."""
 
     tosses: Tosses
     accuracy: str
@@ -129,9 +129,9 @@ class Report:
 
 
 def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -> list[Setup]:
-    """List the fits: the headline, those that lead to it and its two variants; or only `names` in the headline's way.
+    """List the fits: the headline, its two variants and the steps towards it; or `names`, fitted like the headline.
 
-    Second is the contact with the centre of mass where the free flights show it: not fitted to any error.
+    The second fit uses the centre of mass from the free flights, which is not fitted to any error.
     """
     if names is not None:
         return [Setup(", ".join(check_names(names)), tuple(names), Recording())]
@@ -176,9 +176,10 @@ class Measurement:
         return sum(self.effort.evaluations(len(setup.parameters)) for setup in self.setups)
 
     def run(self, tick: Callable[[str, int], None] = lambda what, done: None) -> Report:
-        """Fit each setup, then the ladder and the limits; ``tick`` is told what is done and how many evaluations.
+        """Fit each setup, then measure ladder and limits; ``tick`` gets the finished part and a number of evaluations.
 
-        After Ctrl-C no other setup is fitted, and the ladder is the accuracy of the fit alone: it ends soon.
+        After Ctrl-C no other setup is fitted, and the ladder has only the accuracy of the fit, so that the run ends
+        soon.
         """
         for setup in self.setups:
             case = self._case(setup, lambda best, what=setup.name: tick(f"{what}: {best:.4f}", 1))
@@ -190,12 +191,12 @@ class Measurement:
         return self.report
 
     def headline(self) -> Case:
-        """The case that ladder and limits are about: the headline's, or the last one fitted."""
+        """Case of the ladder and limits: the headline's, or the last one fitted."""
         cases = self.report.cases
         return next((case for case in cases if case.setup.name == HEADLINE), cases[-1])
 
     def errors(self, cube: Cube, recording: Recording, accuracy: str) -> tuple[Errors, np.ndarray, float]:
-        """Errors of all tosses, their poses, and the time per simulated second [µs]."""
+        """Errors of all tosses, their poses, and wall-clock time per simulated second [µs]."""
         tosses = self.report.tosses
         poses, us = replay(tosses.lengths, starts(tosses, cube, recording), cube, accuracy, self.threads)
         return compare(recording.lengths(tosses.states), poses, tosses.offsets), poses, us
@@ -225,7 +226,7 @@ class Measurement:
             self.report.ladder.append(Rung(accuracy, errors.summary(self.others), errors.summary(), us))
 
     def _compile(self, accuracy: str) -> None:
-        """One step of one toss, so that no compilation is in what is timed."""
+        """Take one step of one toss, so that timed runs contain no compilation."""
         begin = starts(self.training.subset([0]), self.headline().fit.cube, Recording())
         replay(np.array([2]), begin, self.headline().fit.cube, accuracy, self.threads)
 

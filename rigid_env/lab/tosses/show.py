@@ -15,7 +15,7 @@ ERRORS = "position\nmean", "position\nmedian", "rotation\nmean", "rotation\nmedi
 
 
 def show(report: Report, case: Case, console: Console) -> None:
-    """Print a report; `case` is the one that its ladder and limits are about."""
+    """Print a report; `case` is that of its ladder and limits."""
     first = report.cases[0]
     console.print(
         f"{len(report.tosses)} tosses, {first.trained.tosses} of them fitted at {report.accuracy} (split seed "
@@ -44,7 +44,7 @@ def _table(title: str, *names: str) -> Table:
 
 
 def case_table(report: Report) -> Table:
-    """Errors of each fit over the tosses fitted, the rest and all, and those of other engines."""
+    """Table of errors: each fit over the tosses of the fit, the rest and all, and those of other engines."""
     title = "over tosses: position error [cube widths], rotation error [degrees]"
     table = _table(title, "fit", "tosses", *ERRORS, "target")
     for case in report.cases:
@@ -64,7 +64,7 @@ def _parameters(case: Case) -> str:
 
 
 def ladder_table(report: Report, case: Case) -> Table:
-    """Errors over the rest, and time, at each accuracy."""
+    """Table of errors over the rest, and of times, at each accuracy."""
     title = f"the parameters of {case.setup.name!r}, rest, at each accuracy"
     table = _table(title, "accuracy", *ERRORS, "µs per\nsimulated s")
     for rung in report.ladder:
@@ -73,7 +73,7 @@ def ladder_table(report: Report, case: Case) -> Table:
 
 
 def limits_table(limits: Limits) -> Table:
-    """Errors that come from the start, and of tosses that end on the measured face and on another."""
+    """Table of errors that come from the start, and of tosses that end on the measured face and on another."""
     table = _table("what limits it", "rest", "tosses", *ERRORS)
     rows = (
         ("noise of the first frame alone", limits.noise), ("ends on the measured face", limits.landed),

@@ -1,4 +1,4 @@
-"""Switches of the optimisations of this compiler: each can be left out, so that its worth can be measured.
+"""Switches of the optimisations of this compiler; each can be turned off to measure its worth.
 
 The environment variable ``RIGID_ENV_WITHOUT=ranges,scalars`` leaves out these two; it is read once, on import. Numba's
 own way takes the place of each, and results differ in rounding at most. ``python -m benchmarks.ablation`` measures them
@@ -70,13 +70,13 @@ WITHOUT = read_names(os.environ.get(VARIABLE, ""))
 
 
 def is_on(name: str) -> bool:
-    """True unless an optimisation, one of `OPTIMISATIONS`, is left out."""
+    """True unless an optimisation, one of `OPTIMISATIONS`, is turned off."""
     if name not in OPTIMISATIONS:
         raise KeyError(name)
     return name not in WITHOUT
 
 
 def folder_suffix() -> str:
-    """End of the name of a folder of machine code, by what is left out: empty if all optimisations are on."""
+    """Suffix of the folder of machine code that names the optimisations turned off; empty if all are on."""
     names = ",".join(sorted(WITHOUT))
     return f"-without-{hashlib.sha256(names.encode()).hexdigest()[:8]}" if names else ""

@@ -1,8 +1,8 @@
-"""Arguments of many words between kernels: passed by address, not word by word.
+"""Pass arguments of many words between kernels by address.
 
-The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba hands each word on as an argument of
-its own: of all instructions written for a step of bodies four in five took that tuple apart or put it together. Here a
-call hands on one address, and a kernel reads from there what it reads of the tuple.
+The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba passes each word as an argument of
+its own. Four in five of all instructions written for a step of bodies took that tuple apart or put it together. Here a
+call passes one address, from which a kernel reads the members that it needs.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ FEW_WORDS = 64 if is_on("argument_passing") else sys.maxsize
 
 
 class Arguments(ArgPacker):
-    """Numba's arguments of a call, but for large tuples.
+    """Numba's arguments of a call, except large tuples.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Arguments(ArgPacker):
         self._be_args = list(_flatten(words))
 
     def assign_names(self, args, names):
-        """Name the words, and say of addresses that nothing is changed there."""
+        """Name the words, and mark addresses as read-only."""
         super().assign_names(args, names)
         for word in args:
             if isinstance(word.type, ir.PointerType) and word.type in self._addresses:
@@ -52,7 +52,7 @@ _ARGUMENT_MODELS: dict[int, tuple] = {}
 
 
 def _argument_model(model):
-    """`_ByAddress` for the model of a large tuple, any other model as it is; each is looked at once."""
+    """`_ByAddress` for the model of a large tuple, any other model as it is; answers are cached."""
     known = _ARGUMENT_MODELS.get(id(model))
     if known is None:
         known = _ARGUMENT_MODELS[id(model)] = model, _ByAddress(model) if _is_large(model) else model
@@ -66,7 +66,7 @@ def _is_large(model) -> bool:
 
 
 class _ByAddress:
-    """The model of a tuple as an argument that is its address."""
+    """Model of a tuple argument that is passed as its address."""
 
     def __init__(self, model):
         self._type = model.get_value_type()
@@ -75,7 +75,7 @@ class _ByAddress:
         return self._type.as_pointer()
 
     def as_argument(self, builder, value):
-        """Address of a value: where it stands already, if it was handed to the caller."""
+        """Address of a value: its present one if it was passed by address itself."""
         if isinstance(value, StructInMemory):
             return value.address
         address = stack_slot(builder, self._type)

@@ -1,8 +1,8 @@
-"""Elements of arrays, and arrays of records, in as few instructions as they need.
+"""Elements of arrays, and arrays of records, in as few instructions as possible.
 
-Numba lowers them by way of memory: to read `a[i, j]` it writes the array's seven words into a place of its own, reads
-shapes and strides from there, and multiplies those of an array whose size is known. The optimiser leaves nothing of
-it; here it is not written in the first place. What is not met below is Numba's.
+Numba lowers elements through memory. To read `a[i, j]` it copies the array's seven words, reads shapes and strides from
+the copy, and multiplies these even for an array of known size. The optimiser removes all of it; here it is not written
+in the first place. All other cases are left to Numba.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _COUNTS_FROM_FRONT = is_on("indices_from_front")
 
 
 def _lengths(builder, array_type, array, member, known) -> list:
-    """Shape or strides [bytes] of an array, as constants where its type has them."""
+    """Shape or strides [bytes] of an array, as constants if its type has them."""
     if isinstance(array_type, types.NestedArray):
         return [word_constant(length) for length in known(array_type)]
     return [builder.extract_value(array, (member, axis)) for axis in range(array_type.ndim)]
 
 
 def _from_front(context, builder, index, type_, length):
-    """An index as a word, counted from the front of an axis.
+    """Index as a word, counted from the front of an axis.
 
     In kernels only a literal counts from the end: to ask of each index whether it is negative takes 6 % of a heap's
     time. Functions of users, which are not written with our builder, may count as they like.
@@ -78,7 +78,7 @@ def _indices(builder, index_type, index) -> tuple[tuple, list]:
 
 
 def _is_element(array_type, index_type) -> bool:
-    """`a[index]` is one element, not a view; of types of an array and an index."""
+    """True if `a[index]` is one element, not a view, by the types of array and index."""
     if not isinstance(array_type, types.Array) or array_type.layout not in "CA":
         return False
     each = index_type.types if isinstance(index_type, types.BaseTuple) else (index_type,)
@@ -100,7 +100,7 @@ def _write(context, builder, sig, args):
 
 
 def _reshape(context, builder, sig, args):
-    """`a.reshape(shape)` of an array without gaps, of as many elements; whether it is, is asked as for an index."""
+    """`a.reshape(shape)` of a contiguous array to as many elements; NUMBA_BOUNDSCHECK=1 checks the sizes."""
     if context.enable_boundscheck or not isinstance(builder, KernelBuilder):
         return NotImplemented
     array, shape = args
@@ -115,7 +115,7 @@ def _reshape(context, builder, sig, args):
 
 
 def array_in_record(context, builder, record_type, record, name):
-    """An array that is a field of a record: all of it is known, but for where it is."""
+    """Array in a field of a record: all of it is a constant, except its address."""
     field = record_type.typeof(name)
     data = cgutils.get_record_member(
         builder, record, record_type.offset(name), context.get_data_type(field.dtype)
@@ -142,14 +142,14 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 def _as_words(index: types.Type) -> types.Type:
-    """Type of an index of which each number is a word."""
+    """Type of an index with all of its numbers as words."""
     if isinstance(index, types.BaseTuple):
         return types.BaseTuple.from_types(tuple(map(_as_words, index.types)))
     return types.intp if index.signed else types.uintp
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers an element, or the array with another shape."""
+    """Return the function that lowers an element, or a reshaped array."""
     if key is operator.getitem and _is_element(*sig.args):
         return _read
     if key is operator.setitem and _is_element(*sig.args[:2]):

@@ -29,7 +29,7 @@ def _word(context, builder, sig, args, k):
 
 
 def _changed_by(operation: str):
-    """Return the lowering of a change by a number that returns the element's value before it."""
+    """Return the lowering of a change by a number, which returns the old value of the element."""
 
     def lower(context, builder, sig, args):
         number = _word(context, builder, sig, args, 3)
@@ -40,19 +40,19 @@ def _changed_by(operation: str):
 
 @intrinsic
 def atomic_add(typing_context, table, row, column, number):
-    """table[row, column] += number; returns what was there before."""
+    """table[row, column] += number; returns the old value."""
     return types.int64(table, row, column, number), _changed_by("add")
 
 
 @intrinsic
 def atomic_exchange(typing_context, table, row, column, number):
-    """table[row, column] = number; returns what was there before."""
+    """table[row, column] = number; returns the old value."""
     return types.int64(table, row, column, number), _changed_by("xchg")
 
 
 @intrinsic
 def compare_exchange(typing_context, table, row, column, expected, number):
-    """table[row, column] = number, if there is what is expected; returns whether there was."""
+    """table[row, column] = number if it equals `expected`; returns whether it did."""
 
     def lower(context, builder, sig, args):
         expected, number = (_word(context, builder, sig, args, k) for k in (3, 4))
@@ -89,7 +89,7 @@ def spin_pause(typing_context):
 
 @intrinsic
 def call_address(typing_context, address):
-    """Result of the system's function at the address, which takes no arguments; -1 if the address is 0."""
+    """Call the system's function at the address, without arguments, and return its result; -1 if the address is 0."""
 
     def lower(context, builder, sig, args):
         function, before = ir.FunctionType(ir.IntType(32), []).as_pointer(), builder.basic_block

@@ -23,7 +23,7 @@ LOCK = global_compiler_lock
 
 
 def make(function, called_as=PART_KIND, **options) -> Kernel:
-    """A `Kernel` of `function` that is not kept on disk."""
+    """Make a `Kernel` of `function` that is not kept on disk."""
     options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
     return Kernel(function, options=options, called_as=called_as)
 
@@ -37,8 +37,8 @@ def _kept(function, called_as=PART_KIND, **options) -> Kernel:
 def part(function) -> Kernel:
     """Compile a function that other kernels call.
 
-    That it is not inlined is said, because Numba would have it inlined where the first caller that it is compiled for
-    is, and with it all that it calls, a copy for each call.
+    The part is marked as not to be inlined. Numba would otherwise inline it if its first caller is inlined, together
+    with all that it calls, one copy for each call.
     """
     return _kept(function, forceinline=False)
 
@@ -47,39 +47,39 @@ entry = part
 
 
 def shared_part(function) -> Kernel:
-    """Compile it with machine code of its own."""
+    """Compile a function with machine code of its own."""
     return _kept(function, SHARED_KIND, forceinline=False)
 
 
 def inlined_part(function) -> Kernel:
-    """Compile it into its callers."""
+    """Compile a function into its callers."""
     return _kept(function, forceinline=True)
 
 
 def runtime_part(function) -> Kernel:
-    """Compile it into its callers, without a place on disk."""
+    """Compile a function into its callers, without a place on disk."""
     return make(function, FOREIGN_KIND, forceinline=True)
 
 
 def user_part(function) -> Kernel:
-    """Compile it likewise, with checks of its indices."""
+    """Compile a user's function into its callers, with checks of its indices."""
     return make(function, FOREIGN_KIND, forceinline=True, boundscheck=True)
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Let `choose` pick the function that a call of `stub` is; it becomes a part of its caller, with no call left."""
+    """Let `choose` pick the function for a call of `stub`, which becomes a part of its caller, with no call left."""
     options = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
     overload(stub, jit_options=options, strict=False)(choose)
     return stub
 
 
 def is_kernel(value) -> bool:
-    """True for what the decorators of kernels make."""
+    """True for the result of a kernel decorator."""
     return isinstance(value, Kernel)
 
 
 def is_none(value) -> bool:
-    """True for None, and for the type of it."""
+    """True for None and its type."""
     return value is None or isinstance(value, types.NoneType)
 
 
@@ -100,12 +100,12 @@ def machine_code(kernel: Kernel, arguments: tuple) -> Callable:
 
 @intrinsic
 def lend(typing_context, value):
-    """The same arrays: nothing counts who refers to them anyway."""
+    """Return the same arrays: kernels count no references anyway."""
     return value(value), lambda context, builder, sig, args: args[0]
 
 
 def renew(function: Dispatcher) -> None:
-    """Forget what is compiled of a function, since something that it reads around it has changed."""
+    """Drop the compiled code of a function, after a global that it reads has changed."""
     if isinstance(function, Kernel):
         function.renew()
     else:
@@ -114,6 +114,6 @@ def renew(function: Dispatcher) -> None:
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
+    """Count the kernels compiled during the block; yields a function that returns the number."""
     with event.install_recorder("numba:compile") as recorder:
         yield lambda: sum(1 for _, what in recorder.buffer if what.is_start)

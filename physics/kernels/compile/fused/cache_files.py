@@ -1,11 +1,11 @@
-"""Files of machine code: each is whole, of this kernel, and of this user, or is not read.
+"""Files of machine code: each must be complete, of this kernel and of this user, or it is not read.
 
-What is kept is unpickled, which can run anything, and then run. So a file begins with a digest of all that follows and
-of what it is for, and it is read only if it belongs to this user or to root and nobody else may write to it. That is
-asked of the file that has been opened, whatever folders lead to it. A damaged file is made anew, with a line that says
-so; where files cannot be written, kernels live in memory.
+A cache file is unpickled, which can run anything, and its code is then run. So a file begins with a digest of its
+content and of its purpose. It is read only if it belongs to this user or to root, and nobody else may write to it. The
+opened file is tested, whatever folders lead to it. A damaged file is made anew, with a line that says so. If files
+cannot be written, kernels live in memory.
 
-A file is named after a digest of what it is for, so that there is no index that two processes could both write.
+A file is named after a digest of its purpose, so there is no index that two processes could both write.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ DIGEST_SIZE = 32  # [bytes]
 
 
 class DamagedFileError(Exception):
-    """A file is not what was written."""
+    """Error about a file with another content than was written."""
 
 
 class ForeignFileError(Exception):
-    """A file that somebody else wrote, or could have written."""
+    """Error about a file that another user wrote, or could have written."""
 
 
 def _checksum(purpose: bytes, content: bytes) -> bytes:
@@ -36,7 +36,7 @@ def _checksum(purpose: bytes, content: bytes) -> bytes:
 
 
 def read_cache_file(path: Path, purpose: bytes):
-    """Return the content of a file written for this purpose; None if there is no such file.
+    """Return the content of a cache file written for this purpose; None if there is no such file.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def read_cache_file(path: Path, purpose: bytes):
 
 
 def write_cache_file(path: Path, purpose: bytes, pickled: bytes) -> None:
-    """Write a file, which appears at once and whole; others may read it, whatever the umask allows them.
+    """Write a file that appears at once and complete; others may read it if the umask allows.
 
     Raises
     ------

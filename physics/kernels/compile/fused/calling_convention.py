@@ -1,8 +1,8 @@
-"""Calling convention between kernels: values in, a value out.
+"""Calling convention between kernels: arguments by value, and a return value in place of a status.
 
-A function that Numba compiles writes its result where its caller tells it, and returns a status; its caller reads the
-status, hands an exception on, and reads the result. Kernels raise none; only functions of users may. Here a part
-returns its value; one that may raise is lowered again as Numba does it, and so are those that call it, so that the
+A function compiled by Numba writes its result to a place of its caller, and returns a status. The caller reads the
+status, passes an exception on, and reads the result. Kernels raise no exceptions; only functions of users may. Here a
+part returns its value. A part that may raise is lowered again in Numba's way, and so are its callers, so that the
 exception gets through.
 """
 
@@ -17,11 +17,11 @@ from physics.kernels.compile.fused.folding_builder import stack_slot
 
 
 class MayRaise(Exception):
-    """A kernel that was to return its value may raise an exception, or return None for a number."""
+    """Error of a kernel that should return its value, but may raise an exception, or return None for a number."""
 
 
 def returns_value(function) -> bool:
-    """A function, or one that is described, returns its value and not a status."""
+    """True if a function, or its descriptor, returns its value instead of a status."""
     return getattr(function, "returns_value", False)
 
 
@@ -33,7 +33,7 @@ class ValueDescriptor(PythonFunctionDescriptor):
 
 
 def declare_value_function(context, module: ir.Module, about) -> ir.Function:
-    """A function that returns its value, in a module that defines or calls it.
+    """Declare a function that returns its value, in a module that defines or calls it.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def declare_value_function(context, module: ir.Module, about) -> ir.Function:
 
 
 def call_value_function(context, builder, about, args):
-    """Result of a call; an exception is handed on, since no kernel catches one."""
+    """Result of a call; an exception passes through, since no kernel catches one."""
     words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
     if returns_value(about):
         result = builder.call(declare_value_function(context, builder.module, about), words)
@@ -70,15 +70,15 @@ def call_value_function(context, builder, about, args):
 
 
 class ValueCallConv(CPUCallConv):
-    """Numba's convention, and that of functions that return their value."""
+    """Numba's convention, and the one of functions that return their value."""
 
     def must_give_status(self, builder: ir.IRBuilder) -> None:
-        """Raise MayRaise if the function being written is one that returns its value."""
+        """Raise MayRaise if the function under construction returns its value."""
         if returns_value(builder.function):
             raise MayRaise(builder.function.name)
 
     def get_arguments(self, func):
-        """Return those of a function's arguments that are a kernel's."""
+        """Return the kernel's own arguments among a function's arguments."""
         return func.args if returns_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):
@@ -89,7 +89,7 @@ class ValueCallConv(CPUCallConv):
             super().return_value(builder, retval)
 
     def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
-        """Leave a function with an exception; where none is given its place is that of the user's statement at hand."""
+        """Leave a function with an exception; its default place is the user's present statement."""
         self.must_give_status(builder)
         if loc is None:
             loc, func_name = getattr(builder, "place", (None, func_name))
@@ -101,7 +101,7 @@ class ValueCallConv(CPUCallConv):
         super().return_dynamic_user_exc(builder, *about, **more)
 
     def return_status_propagate(self, builder, status):
-        """Leave a function with the exception of one that it called, if there is one."""
+        """Leave a function with the exception of a call, if it raised one."""
         if status.code is not RETCODE_OK:
             self.must_give_status(builder)
             super().return_status_propagate(builder, status)
@@ -111,7 +111,7 @@ class ValueCallConv(CPUCallConv):
         super()._return_errcode_raw(builder, code)
 
     def call_function(self, builder, callee, resty, argtys, args, attrs=None):
-        """Status and result of a call that Numba writes."""
+        """Status and result of a call by Numba's lowering."""
         if not returns_value(callee):
             return super().call_function(builder, callee, resty, argtys, args, attrs)
         words = self.context.get_arg_packer(argtys).as_arguments(builder, args)

@@ -1,6 +1,6 @@
-"""Code libraries that kernels are linked to: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
+"""Code libraries of kernels: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
 
-What is not public of Numba here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
+The private part of Numba used here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class KernelOrigin(NamedTuple):
     args: tuple
 
     def load(self) -> None:
-        """Have the machine code in memory."""
+        """Load the machine code into memory."""
         getattr(importlib.import_module(self.module), self.name).stand(self.args)
 
 
@@ -37,7 +37,7 @@ class PartLibrary(JITCodeLibrary):
     """IR of one part, neither linked nor optimised."""
 
     def add_ir_module(self, ir_module):
-        """Take the module in: every whole that calls the part has the same one."""
+        """Add a module; it is the same in every whole that calls the part."""
         for function in ir_module.functions:
             if not function.is_declaration:
                 function.linkage = "linkonce_odr"
@@ -76,14 +76,14 @@ class WholeLibrary(JITCodeLibrary):
 
 
 class OptimisedPart(WholeLibrary):
-    """Machine code of one part, with all below it, as Numba makes it: what calls it optimises it once more."""
+    """Machine code of one part and all below it, as Numba makes it; callers optimise it once more."""
 
     def _optimize_final_module(self):
         JITCodeLibrary._optimize_final_module(self)
 
 
 class SharedLibrary(WholeLibrary):
-    """The same of a kernel that others call by its name.
+    """Machine code of a shared kernel, called by symbol.
 
     Attributes
     ----------
@@ -94,26 +94,26 @@ class SharedLibrary(WholeLibrary):
     origin: KernelOrigin
 
     def machine_code(self) -> bytes:
-        """As it is kept."""
+        """Machine code in its form on disk."""
         self._ensure_finalized()
         return self._get_compiled_object()
 
     def take(self, machine_code: bytes) -> None:
-        """Have machine code that was kept."""
+        """Take machine code from disk."""
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()
 
 
 def _standing(library: CodeLibrary) -> tuple[KernelOrigin, ...]:
-    """Shared kernels that a library adds to those a caller needs."""
+    """Shared kernels that a library adds to those of its caller."""
     if isinstance(library, SharedLibrary):
         return (library.origin,)
     return library.called if isinstance(library, OptimisedPart) else ()
 
 
 def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:
-    """Every library below `whole` once, after all that call it: the linker drops what nobody has called so far."""
+    """Every library below `whole` once, after all of its callers: the linker drops uncalled functions."""
     callees_first: dict[CodeLibrary, None] = {}
 
     def visit(library):

@@ -1,6 +1,6 @@
-"""Machine code on disk: that of wholes, and that of kernels that stand (`dispatcher`).
+"""Machine code of wholes and shared kernels on disk (`dispatcher`).
 
-What is kept of either names the kernels that it calls and that stand: they are loaded before it.
+A file names the shared kernels that its code calls; they are loaded before it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from physics.kernels.compile.notices import warn, warn_once
 
 
 class _Cache:
-    """Machine codes of one kernel on disk, in Numba's place for it.
+    """Machine codes of one kernel on disk, in place of Numba's cache.
 
     Parameters
     ----------
@@ -45,16 +45,16 @@ class _Cache:
         self._is_enabled = self.cache_path is not None and self._source.exists()
 
     def disable(self):
-        """Do not."""
+        """Stop using the disk."""
         self._is_enabled = False
 
     def flush(self):
-        """Forget all that is kept of this kernel."""
+        """Drop everything kept of this kernel."""
         for path in self.cache_path.glob(f"{self._name}.*.nbc") if self._is_enabled else ():
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig, target_context):
-        """Machine code for the types `sig` of arguments; None if there is none that can be used.
+        """Machine code for the types `sig` of arguments; None without a usable one.
 
         Numba refreshes its context first: that fills it with all it can compile, for which SciPy is imported, and takes
         four times as long as to read a step. Machine code needs none of it, as kernels have no run time of Numba
@@ -73,7 +73,7 @@ class _Cache:
         return None
 
     def save_overload(self, sig, made):
-        """Keep machine code, if it can be kept."""
+        """Keep machine code, if that is possible."""
         if not self._is_enabled or made.library.has_dynamic_globals:
             return
         path, purpose = self._place(sig, made.codegen)
@@ -94,7 +94,7 @@ class _Cache:
 
     @cached_property
     def _about(self) -> bytes:
-        """Return the settings that machine code depends on besides the types of arguments and the processor."""
+        """Return the settings, besides argument types and processor, on which machine code depends."""
         function = self._function
         around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
         versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
@@ -103,7 +103,7 @@ class _Cache:
         return b"".join(hashlib.sha256(part).digest() for part in parts)
 
     def _place(self, sig, codegen) -> tuple[Path, bytes]:
-        """File of machine code, and what it is for."""
+        """File of machine code, and its purpose."""
         purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
         return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
 
@@ -114,14 +114,14 @@ def _digest_of_file(path: Path) -> bytes:
 
 
 class WholeCache(_Cache):
-    """The wholes of one kernel: what each calls, and what Numba keeps."""
+    """Cache of the wholes of one kernel: each with its shared kernels, and Numba's data."""
 
     def reduce(self, made):
-        """Return the content to write."""
+        """Return the content of the file."""
         return made.library.called, made._reduce()
 
     def rebuild(self, target_context, payload):
-        """The whole, from what was read."""
+        """Make the whole from the content of its file."""
         called, kept = payload
         for origin in called:
             origin.load()
@@ -129,19 +129,19 @@ class WholeCache(_Cache):
 
 
 class SharedCache(_Cache):
-    """The machine codes of one kernel that stands: without their IR, since nothing is linked with it."""
+    """Cache of a shared kernel's machine codes, without IR, since nothing is linked with it."""
 
     kind = "-standing"  # its file is not that of the whole of the same kernel
 
     def reduce(self, made):
-        """Return the content to write."""
+        """Return the content of the file."""
         library, about = made.library, made.fndesc
         code = library.machine_code()
         about.typemap = about.calltypes = None
         return library.called, library.origin, code, about, made.signature
 
     def rebuild(self, target_context, payload):
-        """The kernel, from what was read."""
+        """Make the kernel from the content of its file."""
         called, origin, code, about, signature = payload
         for each in called:
             each.load()
@@ -155,7 +155,7 @@ class SharedCache(_Cache):
 
 
 def register_library(target_context, about, environment, library):
-    """Have Numba, which knows functions by their entry points, know a kernel under one that must not be called."""
+    """Register a kernel with Numba, which identifies functions by entry points, under one that must not be called."""
     entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
     target_context.insert_user_function(entry, about, [library])
     return entry

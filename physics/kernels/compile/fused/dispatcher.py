@@ -1,26 +1,29 @@
 """Dispatchers that compile kernels together: each to LLVM IR once, all of them to machine code once.
 
-Left to itself Numba optimises a kernel and makes machine code of it as soon as it is typed, and then once more in
-every caller it is linked into, up to a dozen levels of a step. Here a kernel that is called from another one is a
-*part*: lowered to IR and no further. Only a *whole*, which Python calls, links all parts below it, is optimised and
-becomes machine code; it alone is kept on disk.
+Numba's own dispatcher optimises a kernel and compiles it to machine code as soon as it is typed. It does so once more
+in every caller that the kernel is linked into, up to a dozen levels of a step. Here a kernel has one of three roles:
 
-In a whole nobody else can call a part, and the optimiser is told so: it leaves out what a part does not read of its
-arguments, and a part with one caller becomes part of that. The scratch of many bodies is a hundred arrays of seven
-words each, and a part that is handed it reads a dozen: with all of them on the stack calls took a third of a step.
+- A *part* is called from other kernels. It is lowered to IR and no further.
+- A *whole* is called from Python. It links all parts below it, is optimised and compiled to machine code, and is kept
+  on disk.
+- A *shared* kernel is compiled once per signature, with all parts below it, and kept on disk beside the wholes. All
+  wholes call it by symbol.
 
-A kernel that *stands* is in between: machine code of its own, for all wholes that call it by its name, with all parts
-below it, made once for the types of its arguments and kept on disk beside the wholes. The optimiser sees nothing across
-that call, and without it each plan would have its solvers made machine code once more: it is for what is large, does
-not know the plan, and takes long, or is hardly ever needed.
+Nothing outside a whole can call its parts, and the optimiser is told so. It drops arguments that a part does not read,
+and inlines a part with one caller. The scratch of many bodies is a hundred arrays of seven words each, of which a part
+reads a dozen. With all of them on the stack calls took a third of a step.
+
+The optimiser sees nothing across the call of a shared kernel. But without shared kernels each plan would compile its
+solvers once more. So a kernel is shared if it is large, does not depend on the plan, and takes long or is seldom
+needed.
 
 A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
-the types of the process: machine code made in two processes, for two records of the same number, would have the same
-names in it, and a third process that loads both from disk would run the parts of one in the other. Here a digest of the
-types is part of each name.
+the types of the process. So two processes may give the same names to machine code for two different records, and a
+third process that loads both from disk would run the parts of one in the other. Here a digest of the types is part of
+each name.
 
-`pipeline_class` is Numba's documented way to have a function compiled otherwise; what is not public of Numba stands in
-`code_libraries` and `disk_cache`.
+`pipeline_class` is Numba's documented way to change the passes of a function. Code that needs private parts of Numba
+stands in `code_libraries` and `disk_cache`.
 """
 
 from __future__ import annotations
@@ -51,7 +54,7 @@ from physics.kernels.compile.fused.passes import kernel_passes, numbas_passes
 
 
 class _Flags(Flags):
-    """Flags of a compilation. What Numba puts into the names of symbols for them also tells the types of arguments."""
+    """Flags of a compilation, whose part of a symbol's name includes a digest of the types of arguments."""
 
     types = ""
 
@@ -60,7 +63,7 @@ class _Flags(Flags):
 
 
 class _WholeCompiler(CompilerBase):
-    """Passes of ours, into a library of ours."""
+    """Compiler of a whole: the passes of `kernel_passes`, into a `WholeLibrary`."""
 
     library_class: type[JITCodeLibrary] = WholeLibrary
     is_entered = True  # from outside: see `prepared_entry`
@@ -73,7 +76,7 @@ class _WholeCompiler(CompilerBase):
         self.state.flags.no_cfunc_wrapper = not self.is_entered
 
     def passes(self) -> PassManager:
-        """To be run one after another."""
+        """Passes that are run one after another."""
         return kernel_passes(self.state, WholeLowering)
 
     def define_pipelines(self):
@@ -85,7 +88,7 @@ class _WholeCompiler(CompilerBase):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _KeepAsPart(LoweringPass):
-    """Make the part known to Numba."""
+    """Register a part with Numba."""
 
     _name = "keep_as_part"
 
@@ -101,7 +104,7 @@ class _KeepAsPart(LoweringPass):
 
 
 class _PartCompiler(_WholeCompiler):
-    """Up to the IR."""
+    """Compiler of a part: it stops at LLVM IR."""
 
     library_class = PartLibrary if is_on("code_libraries") else OptimisedPart
     is_entered = False
@@ -118,7 +121,7 @@ class _PartCompiler(_WholeCompiler):
 
 
 class _SharedCompiler(_PartCompiler):
-    """Up to machine code, under a name that is the same in all processes: what calls it was made in any of them."""
+    """Compiler of a shared kernel, under a symbol that is the same in all processes that call it."""
 
     library_class = SharedLibrary
 
@@ -131,7 +134,7 @@ class _SharedCompiler(_PartCompiler):
 
 
 class _AnyPartCompiler(_PartCompiler):
-    """For a function of which nothing is known: all that Numba's own pipeline does."""
+    """Compiler of a function that is no kernel, by Numba's own pipeline."""
 
     def passes(self):
         return numbas_passes(self.state, {NativeLowering: UserLowering}, _KeepAsPart)
@@ -141,9 +144,9 @@ class _Part(CPUDispatcher):
     """A kernel that other kernels call."""
 
     def compile(self, sig):
-        """Compile it for the types of its arguments, without the two clocks that Numba starts for each.
+        """Compile it for the types of its arguments, without the two timers that Numba starts for each compilation.
 
-        They tell each other of every call of LLVM, as many of them as calls are nested.
+        Nested timers report every call of LLVM to each other.
         """
         if not is_on("untimed_parts"):
             return super().compile(sig)
@@ -159,11 +162,11 @@ class _Shared(_Part):
     """A kernel that other kernels call, with machine code of its own."""
 
     def enable_caching(self, folder=None):
-        """Keep it on disk, in a folder."""
+        """Keep the machine code on disk, in a folder."""
         self._cache = SharedCache(self.py_func, folder)
 
     def compile(self, sig):
-        """Have the machine code for the types of its arguments, from disk or new."""
+        """Load the machine code for the types of its arguments from disk, or compile it."""
         args, _ = normalize_signature(sig)
         if args not in self.overloads:
             with global_compiler_lock:
@@ -192,7 +195,7 @@ class Kernel(CPUDispatcher):
     options : dict
         Numba's options, as of `numba.njit`.
     called_as : tuple
-        What it is for other kernels: `PART_KIND`, `FOREIGN_KIND` or `SHARED_KIND`.
+        Its role when other kernels call it: `PART_KIND`, `FOREIGN_KIND` or `SHARED_KIND`.
     """
 
     part_pipeline = _PartCompiler
@@ -204,7 +207,7 @@ class Kernel(CPUDispatcher):
         self._part = self._make_part()
 
     def renew(self) -> None:
-        """Forget what is compiled for other kernels: what the function reads around it has changed."""
+        """Drop the code compiled for other kernels, after a global that the function reads has changed."""
         self._part = self._make_part()
         MemoisedTarget.forget(types.Dispatcher(self))
 
@@ -215,11 +218,11 @@ class Kernel(CPUDispatcher):
             self._part.enable_caching(folder)
 
     def stand(self, args: tuple) -> None:
-        """Have the machine code that other kernels call, for these types of arguments."""
+        """Compile the machine code that other kernels call, for these types of arguments."""
         self._part.compile(args)
 
     def as_part(self, args: tuple):
-        """Have it compiled for other kernels and these types of arguments: what Numba keeps of that.
+        """Compile it for other kernels and these types of arguments; return Numba's result.
 
         Raises
         ------

@@ -1,7 +1,8 @@
 """Builder of a kernel's instructions that folds those with known results.
 
-Numba hands structures about (an array is one of seven words): puts a word in, takes another out, and leaves it to LLVM
-to see that nothing happened. Writing that down, reading it and seeing it was most of the time a kernel took.
+Numba passes structures on (an array is one of seven words). It inserts a word, extracts another, and leaves it to LLVM
+to find out that nothing happened. Writing, reading and removing such instructions was most of the compile time of a
+kernel.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ def _position(indices) -> tuple[int, ...]:
 
 
 class StructInMemory:
-    """A structure in memory that nobody changes while a function runs, of which nothing has been read yet.
+    """Structure in read-only memory of which nothing has been read yet.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ class StructInMemory:
         self._members: dict[int, StructInMemory | ir.Value] = {}
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """A member: read at the entry of the function, once, unless it is a structure again."""
+        """Member of the structure, read once at the entry of the function unless it is a structure itself."""
         if k not in self._members:
             with builder.goto_entry_block():
                 address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
@@ -43,7 +44,7 @@ class StructInMemory:
         return self._members[k]
 
     def read(self, builder: ir.IRBuilder):
-        """All of it, as a value."""
+        """Whole structure as a value."""
         return ir.IRBuilder.load(builder, self.address)
 
 
@@ -53,7 +54,7 @@ def member_type(type_: ir.Type, k: int) -> ir.Type:
 
 
 class StructByMembers:
-    """A structure of which only the members are known: written down as one value only where all of it is needed.
+    """Structure known by its members; it is built as one value only where all of it is needed.
 
     Parameters
     ----------
@@ -67,18 +68,18 @@ class StructByMembers:
         self._members = tuple(members)
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """A member."""
+        """Member of the structure."""
         return ir.Constant(member_type(self.type, k), ir.Undefined) if self._members[k] is None else self._members[k]
 
     def changed(self, builder: ir.IRBuilder, value, position: tuple[int, ...]):
-        """The structure with another member, or member of a member."""
+        """Structure with one member, or member of a member, replaced."""
         k, *within = position
         if within:
             value = builder.insert_value(self.member(builder, k), value, within)
         return StructByMembers(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
 
     def read(self, builder: ir.IRBuilder):
-        """All of it, as a value."""
+        """Whole structure as a value."""
         members = [_as_value(builder, self.member(builder, k)) for k in range(len(self._members))]
         whole = ir.Constant(self.type, [m if _is_constant(m) else ir.Constant(m.type, ir.Undefined) for m in members])
         for k, member in enumerate(members):
@@ -88,7 +89,7 @@ class StructByMembers:
 
 
 def make_struct(builder: ir.IRBuilder, type_: ir.Type, members):
-    """A structure of these members, for our builder or Numba's."""
+    """Make a structure of these members, for our builder or Numba's."""
     structure = StructByMembers(type_, members)
     return structure if isinstance(builder, FoldingBuilder) else structure.read(builder)
 
@@ -98,7 +99,7 @@ def _is_constant(value) -> bool:
 
 
 def _split_constant(value):
-    """A constant structure by its members; anything else as it is."""
+    """Members of a constant structure; anything else as it is."""
     if not _is_constant(value) or not isinstance(value.type, ir.Aggregate):
         return value
     known = value.constant if isinstance(value.constant, (list, tuple)) else None
@@ -132,10 +133,10 @@ class KernelBuilder(ir.IRBuilder):
 
 
 class FoldingBuilder(KernelBuilder):
-    """The same with structures known by their members, and constants folded."""
+    """`KernelBuilder` with structures known by their members, and constants folded."""
 
     def extract_value(self, agg, idx, name=""):
-        """A member of a structure: the one that was put in, if that is known."""
+        """Member of a structure: the value that was inserted, if that is known."""
         position = _position(idx)
         agg = _split_constant(agg)
         while position and isinstance(agg, (StructInMemory, StructByMembers)):
@@ -143,7 +144,7 @@ class FoldingBuilder(KernelBuilder):
         return super().extract_value(agg, position, name) if position else agg
 
     def insert_value(self, agg, value, idx, name=""):
-        """A structure with one member changed."""
+        """Structure with one member replaced."""
         agg = _split_constant(agg)
         if isinstance(agg, StructByMembers):
             return agg.changed(self, value, _position(idx))
@@ -192,7 +193,7 @@ def kernel_builder(block: ir.Block) -> KernelBuilder:
 
 
 def _factors(value) -> tuple:
-    """Factors of a product of numbers, or of lanes; none of anything else."""
+    """Factors of a product of numbers or lanes; none of anything else."""
     is_product = isinstance(value, ir.Instruction) and value.opname == "fmul"
     return tuple(value.operands) if is_product and value.type != ir.FloatType() else ()
 
@@ -200,8 +201,8 @@ def _factors(value) -> tuple:
 def fused_multiply_add(builder, a, b, c):
     """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
 
-    That is said here and not left to LLVM (its flag `contract`), which would do so in one kernel and not in another,
-    depending on what else is in it.
+    The instruction is chosen here instead of by LLVM (its flag `contract`). LLVM would fuse in one kernel and not in
+    another, depending on the rest of the kernel.
     """
     width = f"v{c.type.count}" if isinstance(c.type, ir.VectorType) else ""
     type_ = ir.FunctionType(c.type, [c.type] * 3)
@@ -221,16 +222,16 @@ def _is(value, number: int) -> bool:
 
 
 def word_constant(value: int) -> ir.Constant:
-    """A known word."""
+    """Constant word."""
     return ir.Constant(WORD, value)
 
 
 def known_integer(value):
-    """The integer that a value is known to be, or None."""
+    """Integer of a constant value, or None."""
     return value.constant if _is_number(value) else None
 
 
 def stack_slot(builder: ir.IRBuilder, type_: ir.Type):
-    """Memory of a variable, for as long as its function runs; what is in it at first is not defined."""
+    """Memory of a variable for the run of its function, uninitialised."""
     with builder.goto_entry_block():
         return builder.alloca(type_)

@@ -1,8 +1,8 @@
 """Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
 
-Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released or kept where a release
-would find it. Numba's lowering reads what a variable held before each assignment, and reads and clears it at the end of
-its life; what was an array has seven words to read and to clear. A third of all instructions said nothing else.
+Kernels own nothing (`physics.kernels.compile.decorators`), so no variable has to be released, or kept for a release.
+Numba's lowering reads the old value of a variable before each assignment, and reads and clears it at the end of its
+life; an array has seven words to read and to clear. A third of all instructions did only this.
 
 In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
 passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.
@@ -24,7 +24,7 @@ from physics.kernels.compile.fused.prepared_entry import write_prepared_entry
 
 
 class _Values(Lower):
-    """Numba's lowering of one function: a variable is a value, if it is assigned once, and none is released."""
+    """Numba's lowering of one function, in which a variable assigned once is a value, and nothing is released."""
 
     def _find_singly_assigned_variable(self):
         times = Counter(
@@ -53,11 +53,11 @@ class _Values(Lower):
             self.builder.store(value, self.getvar(name))
 
     def delvar(self, name):
-        """Leave a variable as it is at the end of its life, which Numba's passes tell and those of kernels do not."""
+        """Ignore the end of a variable's life: kernels count no references."""
 
 
 class _KernelLower(_Values if is_on("lowering") else Lower):
-    """Lowering of a kernel: with a builder of ours, and an entry for machine code."""
+    """Lowering of a kernel, with our builder, and an entry for machine code."""
 
     def setup_function(self, fndesc):
         """Declare the function, with our builder for its body."""
@@ -68,11 +68,11 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
             self.function.attributes.add("noinline")
 
     def create_cfunc_wrapper(self):
-        """The entry for machine code, in place of Numba's for C; see `prepared_entry`."""
+        """Make the entry for machine code, in place of Numba's for C; see `prepared_entry`."""
         write_prepared_entry(self.context, self.library, self.fndesc)
 
     def lower_block(self, block):
-        """Lower the statements of a block; what cannot be lowered says so in its own words."""
+        """Lower the statements of a block; unsupported ones raise an error in its own words."""
         self._cur_ir_block = block
         for each in block.body:
             self.loc = each.loc
@@ -85,7 +85,7 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
     if is_on("scalars"):
 
         def lower_binop(self, resty, expr, op):
-            """An operation on two values; those with a number written down are no others (`scalars` sees one)."""
+            """Lower an operation on two values; constants in it need no values of their own (`scalars` sees them)."""
             context, builder = self.context, self.builder
             function = context.typing_context.resolve_value_type(op)
             sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
@@ -98,7 +98,7 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
 
 
 class _ValueLower(_KernelLower):
-    """The lowering of a function that returns its value, not a status."""
+    """Lowering of a function that returns its value instead of a status."""
 
     def setup_function(self, fndesc):
         """Declare the function."""
@@ -107,7 +107,7 @@ class _ValueLower(_KernelLower):
 
 
 class _UserLower(Lower):
-    """Numba's lowering of a user's function, which remembers at which statement it is: for exceptions."""
+    """Lowering of a user's function, which tracks the present statement for exceptions."""
 
     def lower_inst(self, inst):
         """Lower a statement."""
@@ -117,7 +117,7 @@ class _UserLower(Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class UserLowering(NativeLowering):
-    """The pass in which a user's function is lowered."""
+    """Pass that lowers a user's function."""
 
     _name = "users_lowering"
     lowering_class = _UserLower
@@ -125,7 +125,7 @@ class UserLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class WholeLowering(NativeLowering):
-    """The pass in which a kernel is lowered as Python calls it."""
+    """Pass that lowers a kernel for calls from Python."""
 
     _name = "whole_lowering"
     lowering_class = _KernelLower
@@ -133,13 +133,13 @@ class WholeLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(WholeLowering):
-    """The pass in which a kernel is lowered as other kernels call it."""
+    """Pass that lowers a kernel for calls from other kernels."""
 
     _name = "part_lowering"
     lowering_class = _ValueLower
 
     def run_pass(self, state):
-        """Lower a kernel; one that may raise an exception gives a status, as all do whose indices are checked."""
+        """Lower a kernel; one that may raise an exception returns a status, as do all with checked indices."""
         if is_on("calling_convention") and not state.targetctx.enable_boundscheck:
             try:
                 return super().run_pass(state)

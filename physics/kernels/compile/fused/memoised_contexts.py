@@ -1,4 +1,4 @@
-"""Numba's two contexts, asked each question once.
+"""Numba's two contexts with cached answers.
 
 To type `a * b` for two floats Numba tries every meaning of `*`, those of arrays, lists and strings as well, and does so
 again for each product of each kernel, in every round of inference and once more while lowering: that was a quarter of
@@ -44,7 +44,7 @@ def _make_table() -> dict:
 
 
 class MemoisedFunction(types.Function):
-    """Built-in function of Numba that remembers its signatures: typing asks it, and lowering once more.
+    """Built-in function of Numba that caches its signatures: typing asks for each, and lowering once more.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class MemoisedFunction(types.Function):
         self.signatures = _make_table()
 
     def augment(self, other):
-        """Numba's function with more templates: it is kept for all contexts."""
+        """Numba's function with additional templates, kept for all contexts."""
         return types.Function(self.templates).augment(other)
 
     def get_call_type(self, context, args, kws):
@@ -76,7 +76,7 @@ register_model(MemoisedFunction)(models.OpaqueModel)
 
 
 class MemoisedTyping(typing.Context):
-    """Typing context of Numba that remembers its answers.
+    """Typing context of Numba that caches its answers.
 
     Parameters
     ----------
@@ -116,12 +116,12 @@ class MemoisedTyping(typing.Context):
 
 @cache
 def memoised(context: typing.Context) -> MemoisedTyping:
-    """The one that remembers for a context: Numba keeps what it compiles of its own by the context it was asked in."""
+    """Memoised form of a typing context, one for each, since Numba keeps compiled code by context."""
     return MemoisedTyping(context)
 
 
 class MemoisedTarget(CPUContext):
-    """Target context that lowers operations as Numba does, or as kernels do where that takes fewer instructions.
+    """Target context that lowers operations in Numba's way, or in fewer instructions for kernels.
 
     Parameters
     ----------
@@ -139,17 +139,17 @@ class MemoisedTarget(CPUContext):
 
     @classmethod
     def forget(cls, fn) -> None:
-        """Forget how calls of `fn` are lowered."""
+        """Drop the lowered calls of `fn`."""
         for key in [key for key in cls.lowerings if key[0] == fn]:
             del cls.lowerings[key]
 
     @property
     def typing_context(self):
-        """The context of types that remembers."""
+        """Typing context with cached answers."""
         return memoised(self.__dict__["typing_context"])
 
     def mangler(self, name, types, *, abi_tags=(), uid=None):
-        """Name of a symbol; that of a kernel that stands (`uid` 0) is the same in all processes.
+        """Name of a symbol; that of a shared kernel (`uid` 0) is the same in all processes.
 
         Numba names a record type by a number that counts the types of the process. The digest among `abi_tags` tells
         the types (`dispatcher`), so that the name can do without them.
@@ -171,7 +171,7 @@ class MemoisedTarget(CPUContext):
         return lowering
 
     def numba_function(self, fn, sig, is_first=True):
-        """Return Numba's way to lower `fn`; its registries are searched once for each `fn`, not for each signature."""
+        """Return Numba's lowering of `fn`; its registries are searched once for each `fn`, not for each signature."""
         if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
         is_new = is_first and fn not in self.asked
@@ -188,13 +188,13 @@ class MemoisedTarget(CPUContext):
         return calling_convention.ValueCallConv(self)
 
     def declare_function(self, module, fndesc):
-        """A function in a module that defines or calls it."""
+        """Declare a function in a module that defines or calls it."""
         if calling_convention.returns_value(fndesc):
             return calling_convention.declare_value_function(self, module, fndesc)
         return super().declare_function(module, fndesc)
 
     def get_arg_packer(self, fe_args):
-        """The words of a call's arguments."""
+        """Packer of the words of a call's arguments."""
         return Arguments(self.data_model_manager, fe_args)
 
     if is_on("array_elements"):
@@ -206,15 +206,15 @@ class MemoisedTarget(CPUContext):
             return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
-        """Lower the value that an iterator gave."""
+        """Lower the value of an iterator's step."""
         return builder.extract_value(val, 0)
 
     def pair_second(self, builder, val, ty):
-        """Lower the test whether an iterator gave a value."""
+        """Lower the test whether an iterator's step has a value."""
         return builder.extract_value(val, 1)
 
     def insert_user_function(self, func, fndesc, libs=()):
-        """Have a kernel known by its entry point, and how it is called."""
+        """Register the entry point and the calls of a kernel."""
 
         def call(context, builder, sig, args):
             is_kernel = isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional)
@@ -227,7 +227,7 @@ class MemoisedTarget(CPUContext):
         self._defns[func].append(call, call.signature)
 
     def get_abi_sizeof(self, ty):
-        """Size of an LLVM type [bytes]: Numba writes and parses a module for each question."""
+        """Size of an LLVM type [bytes], cached: Numba writes and parses a module for each answer."""
         size = self.sizes.get(ty)
         if size is None:
             size = self.sizes[ty] = super().get_abi_sizeof(ty)
@@ -235,7 +235,7 @@ class MemoisedTarget(CPUContext):
 
 
 def _bind_lowering(lower: Callable, context: MemoisedTarget, fn, sig) -> Callable:
-    """A lowering of ours, to be called as Numba calls its own."""
+    """Bind one of our lowerings in the form that Numba calls."""
 
     def lowered(builder, args, loc=None):
         value = lower(context, builder, sig, args)

@@ -1,7 +1,7 @@
-"""Table of operations that answers in Numba's place: the type of a result, and how the operation is lowered.
+"""Table of operations that replaces Numba's: types of results, and lowerings.
 
-Numba has a dozen templates for `a[i]` and asks each, and for what follows it writes many times what is needed. Each
-module here knows some operations; of all others Numba is asked.
+Numba tries a dozen templates for `a[i]`, and then writes many times the necessary code. Each module here knows some
+operations; all others are left to Numba.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _TYPING = tuple(module for module in _LOWERING if hasattr(module, "signature"))
 
 
 def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
-    """Signature of `function` for types of arguments, or None where Numba has to be asked.
+    """Signature of `function` for types of arguments, or None to leave it to Numba.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Numba's passes over a kernel before lowering, without those that kernels have no use for.
+"""Numba's passes over a kernel before lowering, without those that kernels do not need.
 
 Numba's own pipeline looks for closures, comprehensions, `with`, `raise`, array expressions and functions inlined by
 it, none of which a kernel has, and determines after most passes which variable lives where, which nobody asks for
@@ -41,16 +41,16 @@ class _Plain(FunctionPass):
 
 
 class _Interpreter(Interpreter):
-    """From byte code to Numba's own code; of its corrections those that calls with `*` need."""
+    """Pass from byte code to Numba's own code, with only those corrections that calls with `*` need."""
 
     def post_process(self, peepholes, func_ir):
-        """Leave out those for `with`, `try`, dictionaries, and calls with many keywords."""
+        """Leave out corrections for `with`, `try`, dictionaries, and calls with many keywords."""
         return super().post_process([peep_hole_list_to_tuple], func_ir)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _FromByteCode(_Plain):
-    """Numba's own code of a function."""
+    """Pass that makes Numba's own code of a function."""
 
     _name = "kernel_from_byte_code"
 
@@ -75,7 +75,7 @@ class _Rewrites(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _SingleAssignment(_Plain):
-    """Each variable is assigned once."""
+    """Pass after which each variable is assigned once."""
 
     _name = "kernel_single_assignment"
 
@@ -86,7 +86,7 @@ class _SingleAssignment(_Plain):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _Types(_Plain):
-    """Types of variables and targets of calls."""
+    """Pass that finds types of variables and targets of calls."""
 
     _name = "kernel_types"
 
@@ -96,7 +96,7 @@ class _Types(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _NoPhis(PreLowerStripPhis):
-    """Replace phi nodes by assignments at the ends of the branches that meet."""
+    """Pass that replaces phi nodes by assignments at the ends of the joining branches."""
 
     _name = "kernel_no_phis"
 
@@ -121,7 +121,7 @@ _TYPING_PASSES = (
 
 
 class KernelPasses(PassManager):
-    """The passes of a kernel, one after another; what is wrong with it is raised as the pass words it.
+    """Sequence of a kernel's passes; errors keep the words of the pass that raises them.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class KernelPasses(PassManager):
         self.finalize()
 
     def run(self, state):
-        """Pass by pass, without writing down all types of a kernel for each of them."""
+        """Run pass after pass, without Numba's list of all types between them."""
         for each, _ in self.passes:
             one = _pass_registry.get(each).pass_inst
             one.analysis = self._analysis
@@ -144,7 +144,7 @@ class KernelPasses(PassManager):
 
 
 def numbas_passes(state, own: dict[type, type], *after_lowering: type) -> PassManager:
-    """Numba's own pipeline, with passes of ours in place of some of its.
+    """Numba's own pipeline, with some passes replaced by ours.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Make a call that is prepared in memory, and leave a kernel with the exception of one (`prepared_entry`)."""
+"""Make a call that is prepared in memory, and raise its exception in the calling kernel (`prepared_entry`)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ JOB_BYTES = JOB_SIZE * WORD_SIZE
 
 @intrinsic
 def enter_prepared(typing_context, job):
-    """Make the call at an address; its status."""
+    """Make the call at an address; return its status."""
 
     def lower(context, builder, sig, args):
         row = builder.inttoptr(args[0], WORD.as_pointer())
@@ -34,7 +34,7 @@ def enter_prepared(typing_context, job):
 
 @intrinsic
 def raise_prepared(typing_context, code, raised):
-    """Leave the kernel with an exception, if the code is that of one."""
+    """Leave the kernel with an exception, if the status is that of one."""
 
     def lower(context, builder, sig, args):
         code, place = builder.trunc(args[0], STATUS_TYPE), context.call_conv._get_excinfo_argument(builder.function)

@@ -1,10 +1,10 @@
-"""Calls whose arguments stand ready in memory, so that machine code can make them.
+"""Entries of kernels for machine code: arguments are read from memory.
 
-Python hands a kernel two dozen arguments, and of each that is an array seven words are read from a Python object; and
-only one thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of
-all those words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: of an array those
-that Numba has for it, of a tuple those of its members. The entry gives Numba's status: not 0 if the kernel raised an
-exception, of which the address is written then.
+Python passes two dozen arguments to a kernel. Of each array it reads seven words from a Python object, and only one
+thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of all
+those words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: of an array Numba's
+words, of a tuple those of its members. The entry returns Numba's status, which is not 0 if the kernel raised an
+exception; its address is then written.
 """
 
 from __future__ import annotations

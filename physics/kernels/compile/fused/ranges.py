@@ -1,4 +1,4 @@
-"""Counting loops, in as few instructions as they need: Numba asks of each range whether its step is zero."""
+"""Counting loops in as few instructions as possible; Numba tests each range for a step of zero."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _count(context, builder, sig, args):
 
 
 def _iterate(context, builder, sig, args):
-    """An iterator over a range: where its next number is, the end, the step, and where the count of those left is."""
+    """Make an iterator over a range: places of its next number and of the remaining count, its end, its step."""
     start, stop, step = (builder.extract_value(args[0], k) for k in range(3))
     stride = known_integer(step)
     if not stride:
@@ -40,7 +40,7 @@ def _iterate(context, builder, sig, args):
 
 
 def _advance(context, builder, sig, args):
-    """The next number, and whether there is one."""
+    """Next number, and whether there is one."""
     following, step, left = (builder.extract_value(args[0], k) for k in (0, 2, 3))
     number, left_before = builder.load(following), builder.load(left)
     builder.store(builder.add(number, step, flags=NO_SIGNED_WRAP), following)

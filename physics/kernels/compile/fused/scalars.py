@@ -1,4 +1,4 @@
-"""`max`, `min`, `int` and powers of numbers: Numba compiles a function for each number and type of arguments."""
+"""`max`, `min`, `int` and powers of numbers; Numba compiles a function for each count and type of arguments."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.kernels.compile.fused.folding_builder import known_integer
 
 
 def _maximum(context, builder, sig, args):
-    """`max` of numbers: a later one is taken if it is larger, as Python has it, so that NaN stays where it is first."""
+    """`max` of numbers: a later one counts if it is larger, as in Python, so a NaN stays if it comes first."""
     return do_minmax(context, builder, sig.args, args, operator.gt)
 
 
@@ -26,7 +26,7 @@ def _to_integer(context, builder, sig, args):
 
 
 def _power(context, builder, sig, args):
-    """`x ** n`: for an n that is written down the products that Numba takes in a loop."""
+    """`x ** n`: a constant n gives the products of Numba's loop."""
     base, exponent = args[0], known_integer(args[1])
     if not exponent or exponent < 0:
         return NotImplemented

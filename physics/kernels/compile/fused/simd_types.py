@@ -1,4 +1,4 @@
-"""Four numbers at once as a vector of LLVM's: `physics.kernels.compile.simd` says what each operation means."""
+"""Four numbers at once as a vector of LLVM; `physics.kernels.compile.simd` defines each operation."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ LANES, MASK = LanesType(), MaskType()
 
 
 def _model_of(type_: type, one: ir.Type) -> None:
-    """A value of the type is a vector."""
+    """Model of values of the type: a vector."""
 
     @register_model(type_)
     class Model(data_models.PrimitiveModel):
@@ -79,12 +79,12 @@ def _are_numbers(args) -> bool:
 
 
 def _are_lanes(args) -> bool:
-    """Lanes and numbers beside them, at least one of the former."""
+    """True for lanes, or lanes and numbers, at least one of the former."""
     return LANES in args and all(each is LANES or isinstance(each, types.Number) for each in args)
 
 
 def _is_place_of_row(args) -> bool:
-    """A table of numbers, and where in it a row begins."""
+    """True for a table of numbers, and the place of a row's start in it."""
     return (
         isinstance(args[0], types.Array)
         and (args[0].dtype, args[0].ndim, args[0].layout) == (types.float64, 2, "C")
@@ -93,7 +93,7 @@ def _is_place_of_row(args) -> bool:
 
 
 def _result(key, args) -> types.Type | None:
-    """Type of the result of an operation, or None where it is none of ours."""
+    """Type of the result of an operation, or None if it is not on lanes."""
     if key is simd.Lanes:
         return LANES if len(args) == simd.LANE_COUNT and _are_numbers(args) else None
     if key is simd.select_lanes and args[0] is types.boolean:
@@ -133,7 +133,7 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 class _Named(AbstractTemplate):
-    """A function that Numba knows of: `signature` has an answer for it before it is asked."""
+    """Function known to Numba by name: `signature` gives its types."""
 
     def generic(self, args, kws):
         return signature(self.key, self.context, args)
@@ -147,7 +147,7 @@ for _function in _NAMED:
 
 
 def _spread(builder, value):
-    """A number four times; lanes as they are."""
+    """Number repeated four times; lanes as they are."""
     if isinstance(value.type, ir.VectorType):
         return value
     nothing = ir.Constant(ir.VectorType(value.type, simd.LANE_COUNT), ir.Undefined)
@@ -158,7 +158,7 @@ def _spread(builder, value):
 
 
 def _alike(builder, values) -> list:
-    """All values as lanes if one of them is, else as they are."""
+    """All values as lanes if one of them is, else unchanged."""
     has_lanes = any(isinstance(each.type, ir.VectorType) for each in values)
     return [_spread(builder, each) for each in values] if has_lanes else list(values)
 
@@ -200,7 +200,7 @@ def _not(context, builder, sig, args):
 
 
 def _call(name, context, builder, sig, args):
-    """A function of LLVM's for vectors and numbers."""
+    """Call an LLVM function for vectors and numbers."""
     type_ = args[0].type
     width = f"v{simd.LANE_COUNT}" if isinstance(type_, ir.VectorType) else ""
     function = cgutils.get_or_insert_function(
@@ -225,7 +225,7 @@ def _last(builder, first):
 
 
 def _read_row(context, builder, sig, args):
-    """`load_lanes`: a table begins anywhere, so that nothing is known of the place but that it is one of a number."""
+    """`load_lanes`: the alignment is that of one number, since a table may begin anywhere."""
     return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
 
 
@@ -236,7 +236,7 @@ def _write_row(context, builder, sig, args):
 
 
 def _totals(context, builder, sig, args):
-    """`lane_sums`: halves of two and two beside each other, and halves of those."""
+    """`lane_sums`: adds halves of two and two vectors side by side, then halves of the results."""
     a, b, c, d = (_spread(builder, each) for each in args)
 
     def joined(x, y, first, second):
@@ -251,7 +251,7 @@ def _totals(context, builder, sig, args):
 
 
 def _halves(builder, value, join: Callable):
-    """All four joined: the halves with one another, and what is left of them."""
+    """Combine all four lanes: the two halves with each other, then the two that remain."""
     for width in (2, 1):
         nothing = ir.Constant(value.type, ir.Undefined)
         parts = [
@@ -274,7 +274,7 @@ def _extreme(order, context, builder, sig, args):
 
 
 def _first(context, builder, sig, args):
-    """`first_true_lane`: of four bits that are a number, how many are zero before the first one."""
+    """`first_true_lane`: four bits as a number, whose trailing zeros are counted."""
     bits = builder.bitcast(args[0], ir.IntType(simd.LANE_COUNT))
     place = builder.cttz(builder.zext(bits, WORD), ir.IntType(1)(0))
     return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word_constant(-1), place)
@@ -286,7 +286,7 @@ def _read(context, builder, sig, args):
 
 
 def _lane(builder, value, k: int):
-    """One lane: the number that it was made of, if that is known."""
+    """One lane: the number from which it was made, if that is known."""
     made = value
     while isinstance(made, InsertElement):
         made, number, place = made.operands
@@ -296,7 +296,7 @@ def _lane(builder, value, k: int):
 
 
 def _each_lane(lower: Callable, context, builder, sig, args):
-    """An operation that is done to each lane, written for one after another."""
+    """Operation on each lane, one after another."""
     if sig.return_type not in (LANES, MASK):
         return lower(context, builder, sig, args)
     made = ir.Constant(context.get_value_type(sig.return_type), ir.Undefined)

@@ -1,4 +1,4 @@
-"""Tuples of numbers: the member that an index chooses, and whether a number is one of them."""
+"""Tuples of numbers: members by index, and membership tests."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from physics.kernels.compile.fused.folding_builder import KernelBuilder, make_st
 
 
 def _is_numbers(type_: types.Type) -> bool:
-    """A number, or a tuple of numbers and such tuples."""
+    """True for a number, or a tuple of numbers and such tuples."""
     if isinstance(type_, types.BaseTuple):
         return all(map(_is_numbers, type_.types))
     return isinstance(type_, types.Number)
 
 
 def _choose(context, builder, sig, args):
-    """`t[k]`, counted from the front; what a k is that no member has is asked under NUMBA_BOUNDSCHECK=1 alone."""
+    """`t[k]`, counted from the front; only NUMBA_BOUNDSCHECK=1 checks that k is a member's index."""
     if not isinstance(builder, KernelBuilder):
         return NotImplemented
     chosen = context.get_value_type(sig.return_type)
@@ -63,7 +63,7 @@ def _words(builder, value) -> list:
 
 
 def _put_together(builder, type_: ir.Type, words):
-    """A tuple of tuples from its numbers."""
+    """Make a tuple of tuples from its numbers."""
     if not isinstance(type_, ir.Aggregate):
         return next(words)
     return make_struct(
@@ -72,7 +72,7 @@ def _put_together(builder, type_: ir.Type, words):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers a member chosen by an index, or the test whether a number is a member."""
+    """Return the function that lowers a member by index, or a membership test."""
     if len(sig.args) != 2 or not isinstance(sig.args[0], types.UniTuple):
         return None
     members, other = sig.args

@@ -35,9 +35,9 @@ def infer_types(state) -> None:
 
 
 class _Network(ConstraintNetwork):
-    """Network of type constraints; one is looked at again if a variable of it has changed its type since.
+    """Network of type constraints; a constraint is checked again after the type of one of its variables has changed.
 
-    Numba looks at all of them until a round changes nothing, which is twice for most kernels.
+    Numba checks all constraints until a round changes nothing, which takes two rounds for most kernels.
     """
 
     def __init__(self):
@@ -52,7 +52,7 @@ class _Network(ConstraintNetwork):
         self._seen.append(None)
 
     def propagate(self, typeinfer):
-        """Look at each constraint; returns what is wrong, or not known yet."""
+        """Check each constraint; return errors and unknown types."""
         wrong = []
         for k, constraint in enumerate(self.constraints):
             if self._seen[k] == self._types(k, typeinfer.typevars):

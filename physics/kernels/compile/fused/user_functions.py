@@ -1,7 +1,7 @@
-"""Examine a user's function by what Numba made of it: what it returns, and all that it reads.
+"""Examine a user's function in the form that Numba makes of it: its result, and all that it reads.
 
-A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it is
-called with later, so that nothing is compiled twice; its code is then looked through.
+A kernel has no exceptions and no checks of bounds; a user's function may have both. So it is first compiled alone, for
+the types of its later calls, so that nothing is compiled twice. Then its code is examined.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SAFE = ("binop", "inplace_binop", "unary", "getattr", "build_tuple", "cast", "p
 
 @dataclass
 class _Reader:
-    """Looks through a function of a field and all that it calls.
+    """Reader of a field's function and of all that it calls.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class _Reader:
     read_already: set = field(default_factory=set)
 
     def read(self, function: Dispatcher, made, own: set[str]) -> None:
-        """Look through what Numba made of a function; `own` are the arguments that are p."""
+        """Read Numba's form of a function; `own` are the arguments that are p."""
         about = made.type_annotation
         if (made.library, frozenset(own)) in self.read_already:
             return
@@ -103,7 +103,7 @@ class _Reader:
 
 
 def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
-    """Names of p: those given, and what is assigned once, from one of them."""
+    """Names of p: the given ones, and variables assigned once from one of them."""
     found, times = set(own), Counter(each.target.name for each in assigned)
     for each in assigned:
         if isinstance(each.value, ir.Var) and each.value.name in found and times[each.target.name] == 1:
@@ -112,7 +112,7 @@ def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
 
 
 def _asks_for_size(value, own: set[str]) -> bool:
-    """True if this may be p's length: an index that is written down may stand behind a question."""
+    """True if this may be p's length, so that a constant index may stand behind a test."""
     if not isinstance(value, ir.Expr):
         return False
     if value.op == "getattr":
@@ -134,7 +134,7 @@ def form_of(type_: types.Type) -> str | tuple:
 
 
 def examine(function: Dispatcher, arguments: tuple, numbers: str) -> Examined:
-    """Compile a user's function, and look through it and all that it calls.
+    """Compile a user's function, and read it and all that it calls.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ LOCK = threading.RLock()
 
 
 def part(function):
-    """Make a kernel of a function: the same function, whose numbers behave as those of machine code."""
+    """Make a kernel of a function: the same function, with the arithmetic of machine code."""
     made = as_ieee(function)
     made.py_func = function
     return made
@@ -34,7 +34,7 @@ def entry(function):
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Ask `choose` once for each type of the arguments."""
+    """Call `choose` once for each type of the arguments."""
     known: dict[tuple, Callable] = {}
 
     def call(*arguments):
@@ -48,7 +48,7 @@ def chosen(stub: Callable, choose: Callable) -> Callable:
 
 
 def is_kernel(value) -> bool:
-    """True for what the decorators of kernels make."""
+    """True for the result of a kernel decorator."""
     return hasattr(value, "py_func")
 
 
@@ -79,17 +79,17 @@ def machine_code(kernel: Callable, arguments: tuple) -> Callable:
 
 @part
 def lend(value):
-    """The same arrays."""
+    """Return the same arrays."""
     return value
 
 
 def renew(function) -> None:
-    """Do nothing: a function reads what is around it when it is called."""
+    """Do nothing: a Python function reads globals when it is called."""
 
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels that are compiled in the meantime: none."""
+    """Count the kernels compiled during the block: none."""
     yield lambda: 0
 
 

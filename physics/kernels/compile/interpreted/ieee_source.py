@@ -1,7 +1,7 @@
-"""Functions with the arithmetic of machine code: infinite or no number where Python raises an exception.
+"""Functions with the arithmetic of machine code: infinity or NaN where Python raises an exception.
 
-A quotient, a power and a function of `math` of a kernel are calls of functions here. A function is parsed and written
-anew for that, line by line where it stands, so that a debugger stops at the statements of its file.
+Quotients, powers and functions of `math` in a kernel become calls of functions here. The source of the kernel is parsed
+and rewritten for that, each line in its place, so that a debugger stops at the statements of its file.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 
 def divide(x, y):
-    """Quotient of two numbers; of one by zero infinite, of zero by zero no number."""
+    """Quotient of two numbers; infinite for a division by zero, NaN for zero by zero."""
     try:
         return x / y
     except ZeroDivisionError:
@@ -26,7 +26,7 @@ def divide(x, y):
 
 
 def power(x, n):
-    """Power: for a small whole exponent the products that Numba takes, in its order."""
+    """Power; a small integer exponent gives Numba's products, in their order."""
     if isinstance(n, int) and not isinstance(x, int) and 0 <= n <= _MAX_PRODUCTS:
         result = 1.0
         while n:
@@ -43,7 +43,7 @@ _MAX_PRODUCTS = 64
 
 
 def _guarded(function: Callable) -> Callable:
-    """A function of `math` that gives what NumPy gives where Python raises."""
+    """Function of `math` with NumPy's result where Python raises an exception."""
     named = {"acos": "arccos", "asin": "arcsin", "atan": "arctan", "pow": "power"}
     of_numpy = getattr(np, named.get(function.__name__, function.__name__), None)
 
@@ -69,7 +69,7 @@ _NAMES = {"__ieee_divide__": divide, "__ieee_power__": power, "__ieee_math__": I
 
 
 class _Rewrite(ast.NodeTransformer):
-    """Calls of `divide`, `power` and `IEEE_MATH` in place of operators and of `math`."""
+    """Replacement of operators and of `math` by `divide`, `power` and `IEEE_MATH` in a source."""
 
     def visit_BinOp(self, node):
         self.generic_visit(node)
@@ -98,7 +98,7 @@ def _call(name: str, where: ast.AST, *arguments: ast.expr) -> ast.Call:
 
 @cache
 def _codes(file: str, source: str) -> dict[tuple[int, str], CodeType]:
-    """Code of all functions of a file, written anew, by the line in which each begins and its name."""
+    """Rewritten code of all functions of a file, by first line and name."""
     try:
         tree = ast.parse(source)
     except SyntaxError:  # no Python, as a cell of a notebook with commands of its own
@@ -112,7 +112,7 @@ def _codes(file: str, source: str) -> dict[tuple[int, str], CodeType]:
 
 
 def as_ieee(function: FunctionType) -> FunctionType:
-    """Make a function whose numbers behave as those of machine code; the same one where its source is not known."""
+    """Make a function with the arithmetic of machine code; the same one if its source is unknown."""
     old = function.__code__
     linecache.checkcache(old.co_filename)  # it may have been edited
     source = "".join(linecache.getlines(old.co_filename, function.__globals__))

@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Record:
-    """One record: numbers are read and written in the array, fields that are arrays are views of it."""
+    """Record of an array: numbers are read and written in the array, array fields are views of it."""
 
     __slots__ = ("_record", "_views", "dtype")
 
@@ -81,7 +81,7 @@ def records_of(value):
 
 
 def type_of(value):
-    """Type of an argument as a compiler has it: that of its record, or of the members of a tuple."""
+    """Type of an argument in a compiler's view: that of its record, or of the members of a tuple."""
     if isinstance(value, (Record, RecordArray)):
         return value.dtype
     return (type(value), *map(type_of, value)) if isinstance(value, tuple) else type(value)

@@ -39,7 +39,7 @@ shared_part = inlined_part = runtime_part = part
 
 @cache
 def _own_folder() -> Path | None:
-    """Folder of machine code, if nobody else may write to it: Numba runs whatever it finds there."""
+    """Folder of machine code if nobody else may write to it, since Numba runs any content."""
     folder = cache_dir()
     if folder is None:
         return None
@@ -57,7 +57,7 @@ def _own_folder() -> Path | None:
 
 
 def entry(function):
-    """Compile a function that Python calls: kept on disk, with the machine code of all below it."""
+    """Compile a function that Python calls; it is kept on disk, with the machine code of all below it."""
     folder = _own_folder()
     if folder is None:
         return part(function)
@@ -74,18 +74,18 @@ def user_part(function):
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Let `choose` pick the function that a call of `stub` is."""
+    """Let `choose` pick the function for a call of `stub`."""
     overload(stub, jit_options=OPTIONS, strict=False)(choose)
     return stub
 
 
 def is_kernel(value) -> bool:
-    """True for what the decorators of kernels make."""
+    """True for the result of a kernel decorator."""
     return is_jitted(value)
 
 
 def is_none(value) -> bool:
-    """True for None, and for the type of it."""
+    """True for None and its type."""
     return value is None or isinstance(value, types.NoneType)
 
 
@@ -118,13 +118,13 @@ def machine_code(kernel, arguments: tuple) -> Callable:
 
 
 def renew(function) -> None:
-    """Forget what is compiled of a function, since something that it reads around it has changed."""
+    """Drop the compiled code of a function, after a global that it reads has changed."""
     function.recompile()
 
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels that are compiled in the meantime: yields a function that tells how many."""
+    """Count the kernels compiled during the block; yields a function that returns the number."""
     before = _compilations
     yield lambda: _compilations - before
 

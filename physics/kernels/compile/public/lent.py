@@ -1,4 +1,4 @@
-"""Lend the arguments of a step to the kernels below it: large groups by their address.
+"""Lend the arguments of a step to the kernels below it: large groups by address.
 
 Numba hands a tuple on word by word: the scratch of many bodies is a hundred arrays of seven words each. Here such a
 group is put in memory once, and kernels are handed its address. A member that is a group is again an address.
@@ -32,7 +32,7 @@ class LentGroup(types.Type):
 
 
 def member_type(group, name: str):
-    """Type of a member of a named tuple, or of one that is lent."""
+    """Type of a member of a named tuple, or of a lent one."""
     if isinstance(group, LentGroup):
         member = group.group.types[group.group.fields.index(name)]
         return LentGroup(member) if hasattr(member, "fields") and isinstance(member, types.BaseTuple) else member
@@ -47,7 +47,7 @@ class _LentModel(models.PrimitiveModel):
 
 @cache
 def _reader(k: int):
-    """Intrinsic (group) that reads member k."""
+    """Make the intrinsic (group) that reads member k."""
 
     @intrinsic
     def read(typing_context, group):
@@ -64,7 +64,7 @@ def _reader(k: int):
 
 @cache
 def _declare_member(name: str) -> None:
-    """Let kernels read the member `name` of groups that have one."""
+    """Let kernels read the member `name` of any group with one."""
 
     # Without counts a function may not return an array, unless it was handed it.
     @overload_attribute(LentGroup, name, strict=False, jit_options=WITH_COUNTS)
@@ -89,7 +89,7 @@ def _index(context, k: int):
 
 
 def _words(type_) -> int:
-    """Words of a value, about."""
+    """Approximate number of words of a value."""
     if isinstance(type_, types.BaseTuple):
         return sum(map(_words, type_))
     return 5 + 2 * type_.ndim if isinstance(type_, types.Array) else 1
@@ -101,7 +101,7 @@ def _is_large(type_) -> bool:
 
 @intrinsic
 def lend(typing_context, arguments):
-    """A tuple of arguments, lent: it is valid as long as the kernel runs that lends it."""
+    """Lend a tuple of arguments; it is valid while the lending kernel runs."""
     result = types.Tuple([LentGroup(each) if _is_large(each) else each for each in arguments])
 
     def lower(context, builder, sig, args):

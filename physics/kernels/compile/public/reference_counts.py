@@ -1,8 +1,8 @@
 """Options of `numba.njit` that turn reference counts off and on.
 
-Numba counts who refers to an array, in each function that it is handed to. A kernel allocates nothing and owns nothing,
-so that a step needs no count; a tower takes three times as long with them. The option is not documented by Numba. It
-has had it in all releases from 0.61 on; where one refuses it, kernels count.
+Numba counts the references to an array, in each function that gets it. A kernel allocates nothing and owns nothing, so
+a step needs no count; a tower takes three times as long with counts. The option is not documented by Numba. All
+releases from 0.61 on have it; if one refuses it, kernels count.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numba
 
 
 def _nothing() -> None:
-    """Stand for a kernel."""
+    """Do nothing, in place of a kernel."""
 
 
 def _knows_option() -> bool:
-    """Compile nothing with the option: Numba looks at options no earlier."""
+    """True if Numba knows the option; only the compilation of an empty function shows it."""
     try:
         numba.njit("void()", _nrt=False)(_nothing)
     except KeyError:

@@ -1,4 +1,4 @@
-"""Four numbers at once as a type of Numba's: `physics.kernels.compile.simd` says what each operation means.
+"""Four numbers at once as a type of Numba; `physics.kernels.compile.simd` defines each operation.
 
 Each operation is written out for the four numbers, in the order in which it is without a compiler: the bits are the
 same. LLVM makes vectors of them where it sees fit.
@@ -63,7 +63,7 @@ def _is_lanes(type_) -> bool:
 
 
 def _are_lanes(*args) -> bool:
-    """Lanes and numbers beside them, at least one of the former."""
+    """True for lanes, or lanes and numbers, at least one of the former."""
     return any(map(_is_lanes, args)) and all(_is_lanes(each) or isinstance(each, types.Number) for each in args)
 
 
@@ -82,7 +82,7 @@ def _lanes(a, b, c, d):
 
 
 def _one_of_four(read: Callable) -> Callable:
-    """Make the kernel (x) that reads one of four numbers; of a number beside lanes it gives that number."""
+    """Make the kernel (x) that reads one of four numbers; a number beside lanes is returned as it is."""
 
     def one(x):
         return read(x)
@@ -109,7 +109,7 @@ def _get(x, k):
 
 
 def _of_each(function: Callable, of: Callable) -> None:
-    """Have `function` of lanes known as `of` each of them."""
+    """Register `function` of lanes as `of` applied to each lane."""
 
     @_overloaded(function)
     def choose(x):
@@ -119,7 +119,7 @@ def _of_each(function: Callable, of: Callable) -> None:
 
 
 def _of_two(function: Callable, of: Callable) -> None:
-    """Have `function` of lanes, or of lanes and a number, known as `of` each two of them."""
+    """Register `function` of lanes, or of lanes and a number, as `of` applied to each pair."""
 
     @_overloaded(function)
     def choose(x, y):

@@ -1,1 +1,1 @@
-"""Broad phase: which bodies may touch within a stage."""
+"""Broad phase: find the bodies that may touch within a stage."""

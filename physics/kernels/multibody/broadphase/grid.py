@@ -1,4 +1,4 @@
-"""Columns for the broad phase: what is far across the sweep's axis is never compared.
+"""Columns for the broad phase: bodies far apart across the sweep's axis are never compared.
 
 The two world axes across that of the sweep are cut into strips about two mean boxes wide; a body is listed in every
 column that its box enters, in the sweep's order. A body that is large enters many; where all lists together would be
@@ -34,7 +34,7 @@ def _cut(k, many):
 
 @inlined
 def strip_index(x, low, density, strips):
-    """The strip that coordinate x lies in."""
+    """Index of the strip that contains coordinate x."""
     return min(max(int((x - low) * density), 0), strips - 1)
 
 
@@ -51,7 +51,7 @@ def body_strips(b, u, v, cuts, many):
 
 @inlined
 def _count_entries(u, v, cuts, many):
-    """Write into `many.broadphase.first_entry[c + 1]` how many bodies enter column c; how many entries that makes."""
+    """Count the bodies that enter column c into `many.broadphase.first_entry[c + 1]`; return the number of entries."""
     first, total = many.broadphase.first_entry, 0
     for c in range(cuts[2] * cuts[5] + 1):
         first[c] = 0
@@ -66,7 +66,7 @@ def _count_entries(u, v, cuts, many):
 
 @kernel
 def fill_columns(u, v, many):
-    """List the bodies, in the order of `many.broadphase.order`, in the columns along axes u and v; how those were cut.
+    """List the bodies, in the order of `many.broadphase.order`, in the columns along axes u and v; return the cuts.
 
     Column c = strip of u * strips of v + strip of v has `many.broadphase.entry[first_entry[c] : first_entry[c + 1]]`;
     `many.broadphase.cursor[c]` is where it begins.

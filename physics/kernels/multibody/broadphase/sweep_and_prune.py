@@ -1,4 +1,4 @@
-"""Broad phase: which bodies may touch within a stage.
+"""Broad phase: find the bodies that may touch within a stage.
 
 Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
 which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
@@ -25,17 +25,17 @@ _SPIN_GROWTH = 1.5
 
 @inlined
 def center_motion_bound(b, h, many):
-    """Bound for how far body b's centre of mass moves in h without contact, and its bounding sphere with it [m]."""
+    """Bound of the displacement of body b's centre of mass, and of its bounding sphere, in h without contact [m]."""
     t = many.bodies.twist
     return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies.work[b].acceleration
 
 
 @inlined
 def surface_motion_bound(b, h, many):
-    """Bound for how far any point of body b moves in h without contact [m]; by turning no further than across it.
+    """Bound of the displacement of any point of body b in h without contact [m]; a turn adds at most its diameter.
 
-    The angular velocity of what turns far may grow meanwhile: as |dω/dt| <= |ω|²/√3, a turn of θ at its first pace is
-    one of -√3 log(1 - θ/√3) at most, and the chord of that is no longer than 1.5 θ or 2 radii.
+    The angular velocity of a body that turns far may grow meanwhile. As |dω/dt| <= |ω|²/√3, a turn of θ at the initial
+    rate becomes at most -√3 log(1 - θ/√3). Its chord is at most 1.5 θ, or 2 radii.
     """
     t = many.bodies.twist
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
@@ -46,7 +46,7 @@ def surface_motion_bound(b, h, many):
 
 @inlined
 def may_reach_wall(b, wall, h, many):
-    """True if body b's bounding sphere may touch a wall within h; one that turns fast far off may not."""
+    """True if body b may touch a wall within h, by its bounding sphere; a body that turns fast far away may not."""
     d = (
         qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.state, b, POS))
         - many.walls[wall, WALL_OFFSET]
@@ -70,7 +70,7 @@ def may_meet(a, b, h, many):
 
 @inlined
 def half_extent(b, axis, many):
-    """Half the width of body b along a world axis [m]; of a hull that of the block that reaches as far as it does."""
+    """Half the width of body b along a world axis [m]; of a hull that of the block with its `dimensions`."""
     R, d, shape = many.bodies.rotation, many.bodies.work[b].dims, many.bodies.work[b].shape
     if shape == SPHERE:
         return d[0]
@@ -82,7 +82,7 @@ def half_extent(b, axis, many):
 
 @kernel
 def write_swept_boxes(h, many):
-    """Write `many.box`: every body with all it may sweep in h, and the slop."""
+    """Write `many.box`: the region that every body may sweep in h, plus the slop."""
     for b in range(many.bodies.state.shape[0]):
         margin = surface_motion_bound(b, h, many) + many.bodies.work[b].slop
         for axis in range(3):
@@ -109,7 +109,7 @@ def widest_axis(many):
 
 @inlined
 def _merge(first, middle, last, axis, many):
-    """Merge two sorted runs of `many.broadphase.order` that follow each other."""
+    """Merge two adjacent sorted runs of `many.broadphase.order`."""
     order, merged, box = many.broadphase.order, many.broadphase.merged, many.bodies.box
     i, j = first, middle
     for k in range(first, last):
@@ -149,7 +149,7 @@ def _overlap(a, b, many):
 
 @inlined
 def _pair_in_column(a, i, j, axes, cuts, count, many):
-    """Add the pairs of a with those behind it in a column, if their boxes overlap there first: how many pairs now."""
+    """Add the pairs of a with later bodies in a column, if their boxes first overlap there; return the new count."""
     axis, u, v = axes
     box, nv = many.bodies.box, cuts[5]
     column = i * nv + j
@@ -174,7 +174,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
 
 @inlined
 def _count_into(pairs, column, count, first, target):
-    """Copy `count` pairs to `target`, in the order of one of their bodies, else as they are (counting sort)."""
+    """Copy `count` pairs to `target`, sorted by one of their bodies, equal ones in their old order (counting sort)."""
     for b in range(first.shape[0]):
         first[b] = 0
     for k in range(count):
@@ -198,7 +198,7 @@ def _is_sorted(pairs, count):
 
 @kernel
 def _sort_pairs(count, many):
-    """Sort the pairs by their first, then their second body: where other bodies are does not change their order."""
+    """Sort the pairs by their first, then their second body; places of other bodies do not change their order."""
     sweep = many.broadphase
     _count_into(sweep.pairs, 1, count, sweep.first_entry, sweep.sorted_pairs)
     _count_into(sweep.sorted_pairs, 0, count, sweep.first_entry, sweep.pairs)
@@ -206,7 +206,7 @@ def _sort_pairs(count, many):
 
 @kernel
 def find_pairs(h, many):
-    """Write `many.broadphase.pairs` and their number: all pairs (a < b) of bodies whose boxes overlap, in order."""
+    """Write `many.broadphase.pairs` and their number: all pairs (a < b) with overlapping boxes, in order."""
     write_swept_boxes(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)

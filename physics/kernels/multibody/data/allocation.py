@@ -1,4 +1,4 @@
-"""Room for the workspace of a world whose bodies touch each other: capacities, and one function for each group.
+"""Allocate the workspace of a world whose bodies touch each other: capacities, and one function for each group.
 
 Capacities grow with the numbers of bodies, walls and contacts; what finds no room is counted in the report.
 """
@@ -41,7 +41,7 @@ from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
 
 def bodies_setting_fields() -> list[tuple]:
-    """Fields of the numerical settings, and what a stage tells the solver."""
+    """Fields of the numerical settings, and of a stage's instructions to the solver."""
     f, i = np.float64, np.int64
     return [
         *setting_fields(),
@@ -57,28 +57,28 @@ def bodies_setting_fields() -> list[tuple]:
 
 
 def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
-    """Contacts that a world of so many bodies and walls has room for; `polyhedra` are those of `make_hulls`."""
+    """Largest number of contacts in a world of so many bodies and walls; `polyhedra` are those of `make_hulls`."""
     corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
     return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
 
 
 def pair_capacity(bodies: int) -> int:
-    """Pairs near each other that a world of so many bodies has room for."""
+    """Largest number of near pairs in a world of so many bodies."""
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
 
 
 def block_capacity(bodies: int) -> int:
-    """Off-diagonal blocks of the linear system that a world of so many bodies has room for."""
+    """Largest number of off-diagonal blocks of the linear system in a world of so many bodies."""
     return min(max(1, bodies * (bodies - 1) // 2), BLOCKS_PER_BODY * bodies)
 
 
 def batch_capacity(bodies: int, contacts: int) -> int:
-    """Batches of contacts that a world with room for so many bodies and contacts has room for."""
+    """Largest number of batches of contacts in a world of so many bodies and contacts."""
     return max(1, min(contacts, BATCHES_PER_BODY * bodies))
 
 
 def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
-    """Columns of `memory` of one world; of one whose substeps are refined the last one is for the length of a part."""
+    """Number of columns of `memory` of one world; with refined substeps the last one is the length of a part."""
     return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
 
 
@@ -94,7 +94,7 @@ def make_bodies_workspace(
     relative_slop: float,
     **settings: float,
 ) -> BodiesWorkspace:
-    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), in fields, with numerical settings.
+    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), with fields and numerical settings.
 
     `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
     walls only; `is_sequential` whether contacts that collide do so one after the other; `is_error_controlled` whether
@@ -252,7 +252,7 @@ def _make_settings(settings: dict[str, float]) -> np.ndarray:
 
 
 def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:
-    """Room for a world of so many bodies and columns of `memory` at three moments."""
+    """Storage for a world of so many bodies and columns of `memory` at three moments."""
     return WorldSnapshots(
         np.zeros((3, bodies, STATE_SIZE)),
         np.zeros((3, memory)),

@@ -74,7 +74,7 @@ WARM_CONTACT_SIZE = 9
 
 
 class WorldSnapshots(NamedTuple):
-    """A world at the moments to which `adaptive_substep` comes back, one row for each."""
+    """States of a world to which `adaptive_substep` returns, one row for each."""
 
     state: np.ndarray  # (moments, bodies, STATE_SIZE) states of the bodies
     memory: np.ndarray  # (moments, columns) row of `memory`
@@ -173,7 +173,7 @@ class Islands(NamedTuple):
 
 
 class LinearSystem(NamedTuple):
-    """Sparse system of an island: a 6 x 6 block for each body and for each two that touch."""
+    """Sparse system of an island: a 6 x 6 block for each body, and for each touching pair."""
 
     diagonal: np.ndarray  # (bodies, BLOCK_SIZE) of `block_lu`: block of a body, then its inverse
     lower: np.ndarray  # (blocks, BLOCK_SIZE) blocks below the diagonal, column by column

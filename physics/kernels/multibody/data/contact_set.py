@@ -1,4 +1,4 @@
-"""The contact set of a world: one row per contact, its points fixed to the bodies while a stage moves them."""
+"""Contact set of a world: one row per contact, with points that move with the bodies during a stage."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ARRIVAL_SHARE = 1.0e-7
 
 @inlined
 def row_matrix(rows, i):
-    """The nine numbers of row i."""
+    """Nine numbers of row i."""
     return (
         rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7], rows[i, 8],
     )  # fmt: skip
@@ -56,8 +56,8 @@ def add_scaled(a, s, b):
 def tangent_basis(n):
     """Two unit vectors that complete the unit vector n to a right-handed frame.
 
-    The first comes from the world axis that follows the one n is most along: for a normal along a world axis the
-    frame is a permutation of the world's, exactly.
+    The first tangent comes from the world axis after the one that n is most along. So for a normal along a world axis
+    the frame is a permutation of the world's, exactly.
     """
     x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
     e = (0.0, 1.0, 0.0)
@@ -73,7 +73,7 @@ def tangent_basis(n):
 
 @inlined
 def write_contact_frame(k, n, many):
-    """Write the frame of contact k from its normal; that of the contact before it where normals are the same."""
+    """Write the frame of contact k from its normal; contacts with equal normals share the frame of the first."""
     frame = many.contacts.frame
     if k > 0 and n == row_vector(frame, k - 1, 0):
         t1, t2 = row_vector(frame, k - 1, 3), row_vector(frame, k - 1, 6)
@@ -86,7 +86,7 @@ def write_contact_frame(k, n, many):
 
 @inlined
 def relative_velocity(k, t, many):
-    """Velocity of the first body's point of contact k relative to the second's, for twists t, world frame [m/s]."""
+    """Velocity of contact k's point on the first body relative to the second, for twists t, world frame [m/s]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.contacts.arm, k, 0)))
     if b >= 0:
@@ -98,19 +98,19 @@ def relative_velocity(k, t, many):
 
 @inlined
 def velocity_in_contact_frame(k, t, many):
-    """The same in the contact's frame: normal, tangents."""
+    """Velocity of `relative_velocity` in the contact's frame: normal, tangents."""
     return qt.matvec(row_matrix(many.contacts.frame, k), relative_velocity(k, t, many))
 
 
 @inlined
 def contact_velocity(k, many):
-    """`velocity_in_contact_frame` for the twists as they are."""
+    """`velocity_in_contact_frame` for the present twists."""
     return velocity_in_contact_frame(k, many.bodies.twist, many)
 
 
 @inlined
 def pair_slop(a, b, many):
-    """Gap within which two bodies, or body a and a wall (b < 0), touch [m]."""
+    """Largest gap of touching bodies, or of body a and a wall (b < 0) [m]."""
     if b < 0:
         return many.bodies.work[a].slop
     return min(many.bodies.work[a].slop, many.bodies.work[b].slop)
@@ -118,7 +118,7 @@ def pair_slop(a, b, many):
 
 @inlined
 def parted_slack(k, many):
-    """By how much contact k may go in beyond its gap [m]: what bodies that pass are thinned by; 0 of all others."""
+    """Allowed depth of contact k beyond its gap [m]: the thinning of bodies that pass each other; else 0."""
     if many.contacts.owner[k] != PARTED:
         return 0.0
     return DEEP_SHARE * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
@@ -126,7 +126,7 @@ def parted_slack(k, many):
 
 @inlined
 def arrival_gap(a, b, many):
-    """Gap at which what turns far has arrived at a wall (b < 0) or another body [m]."""
+    """Gap at which a body that turns far counts as arrived at a wall (b < 0) or another body [m]."""
     radius = many.bodies.work[a].radius
     if b >= 0:
         radius = min(radius, many.bodies.work[b].radius)
@@ -135,13 +135,13 @@ def arrival_gap(a, b, many):
 
 @inlined
 def _may_turn_far(a, b, many):
-    """True if one of them may turn far in this stage (`stepping.conservative_advancement`)."""
+    """True if either body may turn far in this stage (`stepping.conservative_advancement`)."""
     return many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)
 
 
 @inlined
 def relative_acceleration_bound(k, many):
-    """Bound for the relative acceleration of a contact's points without contact [m/s²]."""
+    """Bound of the relative acceleration of a contact's points without contact [m/s²]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if b < 0:
         return many.bodies.work[a].acceleration
@@ -150,7 +150,7 @@ def relative_acceleration_bound(k, many):
 
 @inlined
 def _combine_materials(k, a, b, many):
-    """Coefficients of two bodies: the geometric mean of friction, the larger restitution. Of a wall: the body's."""
+    """Coefficients of a pair: geometric mean of friction, larger restitution; at a wall the body's."""
     mu, e = many.bodies.work[a].mu, many.bodies.work[a].restitution
     if b >= 0:
         mu, e = math.sqrt(mu * many.bodies.work[b].mu), max(e, many.bodies.work[b].restitution)
@@ -167,9 +167,9 @@ def _write_anchor(k, b, first, point, many):
 
 @inlined
 def _first_body_share(a, b, many):
-    """Share of the first body's point in the common one, of a contact whose normal no body owns.
+    """Weight of the first body's point in the common one, for a contact whose normal belongs to no body.
 
-    1 or 0 where one body is rounder, whose point stays under its centre; 1/2 where neither comes first.
+    The weight is 1 or 0 if one body is rounder, so that its point stays under its centre, and 1/2 if neither is.
     """
     one, other = many.bodies.work[a].shape, many.bodies.work[b].shape
     if one != other:
@@ -202,15 +202,15 @@ def _join_points(k, a, b, owner, gap, n, many):
 
 @inlined
 def is_stopping(gap, speed, slop, h):
-    """True if a contact would stop its bodies within h: it goes in, and by slops if it touches now."""
+    """True if a contact would stop its bodies within h: they would overlap, by slops if they touch now."""
     return gap + h * speed < (0.0 if gap > slop else -DEEP_SHARE * slop)
 
 
 @kernel
 def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
-    """Add a contact to the set if it touches, or could within h: whether there was room for it.
+    """Add a contact to the set if it touches, or could within h; return whether there was room.
 
-    What turns far touches from its `arrival_gap` on.
+    A body that turns far touches at its `arrival_gap`.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
 
 @inlined
 def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
-    """Record the one contact of a and b, of which one is `first`; n is out of the other one."""
+    """Record the only contact of a and b, of which one is `first`; n points out of the other one."""
     if first == a:
         add_contact(a, b, 0, -1, n, on_first, on_second, gap, h, many)
     else:
@@ -279,7 +279,7 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 def _carried_point(b, k, first, side, n, many):
     """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
 
-    That of a round body is where its normal is that of the contact: turning brings another point there.
+    On a round body this is the point with the contact's normal: turning brings another point there.
     """
     shape, d = many.bodies.work[b].shape, many.bodies.work[b].dims
     if shape == SPHERE:
@@ -293,9 +293,9 @@ def _carried_point(b, k, first, side, n, many):
 
 @inlined
 def _turn_frame(k, a, b, many):
-    """Turn the frame of contact k to where its bodies are now, and return its normal.
+    """Turn the frame of contact k with its bodies, and return its normal.
 
-    A face's normal turns with its owner, that of two spheres is along the line of their centres.
+    A face's normal turns with its body; that of two spheres stays along the line of their centres.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -312,9 +312,10 @@ def _turn_frame(k, a, b, many):
 
 @kernel
 def update_contacts(many):
-    """Arms, frames and gaps of the contact set where the bodies are now, their points and normals carried along.
+    """Move arms, frames and gaps of the contact set with the bodies.
 
-    The gap between the two points along the normal; the second one of a wall is the first one projected on it.
+    The gap is the distance of the two points along the normal. On a wall, the second point is the projection of the
+    first.
     """
     for k in range(many.counts[NUM_CONTACTS]):
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]

@@ -1,4 +1,4 @@
-"""Convex polyhedra among the bodies of a world: tables of their corners, faces and edges, and those of a pair in place.
+"""Tables of the convex polyhedra of a world: corners, faces and edges, and scratch for a pair in place.
 
 The tables are made once and only read; bodies of equal hulls share an entry. A block has one too where there are hulls:
 the unit cube's, whose corners are scaled by the half edges it has in this world.
@@ -20,10 +20,10 @@ EDGE_START, EDGE_END, EDGE_LEFT_FACE, EDGE_RIGHT_FACE = range(4)
 
 
 class Hulls(NamedTuple):
-    """Tables, then scratch for a pair of polyhedra: body `which` of it (0 or 1) in its first axis.
+    """Tables, and scratch for a pair of polyhedra, whose first axis is the body (0 or 1) of the pair.
 
-    The pair stands in the axes of the world, with the place of the first body as origin: far from the world's nothing
-    is lost. Corners and faces are counted from 0 in each polyhedron.
+    The pair is stored in the axes of the world, relative to the place of the first body, so that nothing is lost far
+    from the world's origin. Corners and faces are counted from 0 in each polyhedron.
     """
 
     of: np.ndarray  # (bodies, 6): see above; all 0 of what is round
@@ -41,7 +41,7 @@ class Hulls(NamedTuple):
 
 
 class Solid(NamedTuple):
-    """A convex polyhedron as `make_hulls` reads it: members of `physics.mass.polyhedron.Polyhedron`."""
+    """Convex polyhedron for `make_hulls`: members of `physics.mass.polyhedron.Polyhedron`."""
 
     vertices: np.ndarray
     normals: np.ndarray
@@ -50,7 +50,7 @@ class Solid(NamedTuple):
 
 
 def _cube() -> Solid:
-    """The cube with the half edge 1; corner k as in `support_function.vertex_height`."""
+    """Cube with the half edge 1; corner k as in `support_function.vertex_height`."""
     corners = np.array([[1.0 if k >> j & 1 else -1.0 for j in range(3)] for k in range(8)])
     normals, loops = [], []
     for axis, sign in product(range(3), (1.0, -1.0)):
@@ -71,7 +71,7 @@ CUBE = _cube()
 
 
 def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
-    """Tables for bodies, None where one is round: the same object for equal hulls, `CUBE` for blocks."""
+    """Tables for bodies, None for round ones; equal hulls share an object, and blocks share `CUBE`."""
     kinds = {id(body): body for body in bodies if body is not None}
     corners, normals, loops, ring, edges, place = [], [], [], [], [], {}
     for key, solid in kinds.items():
@@ -96,5 +96,5 @@ def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
 
 
 def clipped_face_capacity(bodies: Sequence[Solid | None]) -> int:
-    """Corners that the largest face clipped by another one can have: each side cuts off one corner and makes two."""
+    """Largest number of corners of a face clipped by another; each side cuts off one corner and makes two."""
     return 2 * max([len(loop) for body in bodies if body is not None for loop in body.loops], default=0)

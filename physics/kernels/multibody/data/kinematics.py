@@ -1,4 +1,4 @@
-"""Kinematics of the bodies of a world: rotations, centres, inverse inertias and twists of this moment."""
+"""Kinematics of the bodies of a world: present rotations, centres, inverse inertias and twists."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.kernels.state.body import angular_velocity, principal_attitude, rea
 
 @inlined
 def update_body_pose(b, offset_frame, many):
-    """Rotation, geometric centre and inverse inertia of body b where it is now, world frame."""
+    """Compute rotation, geometric centre and inverse inertia of body b from its present state, world frame."""
     x, q, _, _ = read_state(many.bodies.state, b)
     work = many.bodies.work[b]
     R = qt.to_matrix(q)
@@ -34,7 +34,7 @@ def update_body_pose(b, offset_frame, many):
 
 @inlined
 def update_poses_and_twists(offset_frame, many):
-    """`update_body_pose`, and the twist, of every body."""
+    """Do `update_body_pose`, and compute the twist, for every body."""
     for b in range(many.bodies.state.shape[0]):
         update_body_pose(b, offset_frame, many)
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))

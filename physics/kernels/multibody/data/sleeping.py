@@ -1,8 +1,8 @@
-"""Sleep in worlds whose bodies touch each other: what may touch falls asleep together, and wakes together.
+"""Sleep in worlds whose bodies touch each other: touching bodies fall asleep and wake together.
 
 A group is what the broad phase connects: bodies whose boxes overlap, and bodies that springs tie together. Whatever is
-in contact is in one group, so that a group that sleeps has no contact with anything awake; what comes near it is met in
-the broad phase first, and wakes it before a contact is looked for.
+in contact is in one group, so that a group that sleeps has no contact with anything awake; a body that comes near is
+found by the broad phase first, and wakes the group before contacts are searched.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def wake_group(world, count, group, sleep):
 
 @inlined
 def wake_world(world, count, sleep):
-    """Wake everything, if the scene declares sleep."""
+    """Wake all bodies, if the scene declares sleep."""
     if sleep is None:
         return
     for i in range(world * count, (world + 1) * count):
@@ -55,7 +55,7 @@ def is_world_asleep(world, count, sleep):
 
 @inlined
 def is_staying_asleep(world, count, wrench, sleep):
-    """True if every body of a world sleeps and goes on to do so under these wrenches; wakes those that do not."""
+    """True if every body of a world sleeps and stays asleep under these wrenches; wakes the others' groups."""
     for i in range(world * count, (world + 1) * count):
         if has_new_wrench(i, wrench, sleep):
             if is_asleep(i, sleep):
@@ -66,7 +66,7 @@ def is_staying_asleep(world, count, wrench, sleep):
 
 @kernel
 def wake_touched_groups(world, sleep, many):
-    """Wake every group that something awake is near: a pair of the broad phase of which one body sleeps."""
+    """Wake every sleeping group near an awake body: a pair of the broad phase with one sleeping body."""
     first, is_waking = world * many.bodies.state.shape[0], True
     while is_waking:
         is_waking = False
@@ -80,7 +80,7 @@ def wake_touched_groups(world, sleep, many):
 
 @inlined
 def _union_near_pairs(many):
-    """Let `many.islands.parent` lead from every body to the first one of its group."""
+    """Link every body to the first one of its group in `many.islands.parent`."""
     for b in range(many.islands.parent.shape[0]):
         many.islands.parent[b] = b
     for k in range(many.counts[NUM_PAIRS]):
@@ -90,10 +90,10 @@ def _union_near_pairs(many):
 
 @kernel
 def put_quiet_groups_to_sleep(world, sleep, many):
-    """Let every group fall asleep in which all bodies have been quiet for long enough, and no way grows.
+    """Put groups to sleep whose bodies have all been quiet for long enough, with no growing motion.
 
-    Largest ways of a group in its last two windows, and whether one of it is not quiet, are gathered at its root in
-    `many.islands.group_motion`.
+    The root of each group in `many.islands.group_motion` gathers the largest displacements of its last two windows, and
+    whether any of its bodies is not quiet.
     """
     count, found = many.bodies.state.shape[0], many.islands.group_motion
     first = world * count
@@ -116,7 +116,7 @@ def put_quiet_groups_to_sleep(world, sleep, many):
 
 @kernel
 def update_sleep(world, h, sleep, many):
-    """Watch every body that is awake after a substep of h; what has been quiet for long enough falls asleep."""
+    """Update the windows of all awake bodies after a substep of h, and put quiet groups to sleep."""
     first, is_time = world * many.bodies.state.shape[0], False
     for b in range(many.bodies.state.shape[0]):
         if not is_asleep(first + b, sleep) and update_sleep_window(

@@ -1,4 +1,4 @@
-"""Warm start of a world's contacts: impulses of the last stage, to start the next solve with.
+"""Warm start of a world's contacts: impulses of the last stage, from which the next solve starts.
 
 Contacts are recognised by their ids. Impulses are kept in the world frame, so that a contact whose frame has turned
 starts with the same force.
@@ -32,7 +32,7 @@ def _contact_column(k):
 
 @inlined
 def _hash_slot(contact_id, table):
-    """Start of the search for an id: its low bits, well mixed (Knuth's multiplicative method)."""
+    """Start of the search for an id in the table: its low bits, well mixed (Knuth's multiplicative method)."""
     return ((contact_id * 2654435761) >> 16) & (table.shape[0] - 1)
 
 
@@ -59,7 +59,7 @@ def _index_ids(world, memory, table):
 
 @inlined
 def _clear_ids(world, memory, table):
-    """Empty the table again: its cost is that of the contacts, not of the room for them."""
+    """Clear the table; the cost grows with the contacts, not with the table."""
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
@@ -89,7 +89,7 @@ def load_warm_impulses(n, world, h, friction, memory, many):
 
 @inlined
 def _keep_sleeping(world, h, sleep, memory, many):
-    """Move the contacts of what sleeps to the front, their impulses as of a stage of length h: how many."""
+    """Move the contacts of sleeping bodies to the front, with impulses of a stage of length h; return their number."""
     if sleep is None:
         return 0
     first, count, length = world * many.bodies.state.shape[0], 0, memory[world, WARM_STAGE_LENGTH]
@@ -106,7 +106,7 @@ def _keep_sleeping(world, h, sleep, memory, many):
 
 @kernel
 def store_warm_impulses(n, world, h, sleep, memory, many):
-    """Keep the n contacts of this stage, which took h, and those of what sleeps, as far as there is room."""
+    """Keep the n contacts of this stage, of length h, and those of sleeping bodies, as far as there is room."""
     before = _keep_sleeping(world, h, sleep, memory, many)
     n = min(n, many.contacts.gap.shape[0] - before)
     memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, before + n
@@ -129,13 +129,13 @@ def store_warm_impulses(n, world, h, sleep, memory, many):
 
 @inlined
 def clear_warm_start(world, memory):
-    """Nothing is remembered, as where the bodies were put."""
+    """Forget all contacts, as after a change of places."""
     memory[world, WARM_STAGE_LENGTH] = memory[world, WARM_CONTACT_COUNT] = 0.0
 
 
 @inlined
 def clear_awake_warm_start(world, h, sleep, memory, many):
-    """Nothing touches any more but what sleeps, in a stage that took h."""
+    """Forget all contacts except those of sleeping bodies, in a stage of length h."""
     if sleep is None:
         memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, 0.0
     else:
@@ -144,7 +144,7 @@ def clear_awake_warm_start(world, h, sleep, memory, many):
 
 @inlined
 def copy_contact(k, to, many):
-    """Move contact k of the set to another place in it; what a stage has not filled yet is left."""
+    """Copy contact k of the set to another place in it, except columns that a stage fills later."""
     many.contacts.id[to], many.contacts.owner[to], many.contacts.gap[to], many.contacts.speed[to] = (
         many.contacts.id[k],
         many.contacts.owner[k],

@@ -1,4 +1,4 @@
-"""Contacts of one body with one wall: vertices of a block, corners of a hull, the nearest point of what is round."""
+"""Contacts of one body with one wall: vertices of a block, corners of a hull, the nearest point of a round body."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def _reference_face(a, b, face, many):
 
 @inlined
 def _clip_face(a, b, face, many):
-    """Clip the face that looks against this one by its sides: (copy of the polygon, vertices)."""
+    """Clip the face opposite to this one by its sides: (copy of the polygon, vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
     d, slop = many.bodies.work[r].dims, pair_slop(a, b, many)
@@ -64,11 +64,12 @@ def _clip_face(a, b, face, many):
 
 @inlined
 def _parallel_edge_normal(o, out, rim, point, many):
-    """Normal of two parallel edges that touch: the middle of all that are allowed.
+    """Normal of two parallel edges that touch: the middle of all allowed normals.
 
-    An edge of a convex body allows every direction between the normals of its two faces: of the one block from `out`
-    to `rim`, of block o from one to the other of those whose edge passes `point`, turned round. Both hold `out`, and
-    o's ends before `rim`, a quarter turn from its other end: what both allow lies between `out` and that end.
+    An edge of a convex body allows every direction between the normals of its two faces. For the one block these are
+    the directions from `out` to `rim`. For block o they lie between the two normals, reversed, of the faces whose edge
+    passes `point`. Both ranges contain `out`, and that of o ends before `rim`, a quarter turn from its other end. So
+    both allow the directions between `out` and that end.
     """
     end, most, along = out, 0.0, qt.cross(out, rim)
     w = subtract(point, row_vector(many.bodies.center, o, 0))
@@ -141,7 +142,7 @@ def _middle_of_edge(b, k, n, many):
 
 @inlined
 def _add_edge_contact(a, b, edges, gap, h, many):
-    """The contact of two edges, at their nearest points."""
+    """Add the contact of two edges, at their nearest points."""
     i, j = edges // 3, edges % 3
     x, y = body_axis(many.bodies.rotation, a, i), body_axis(many.bodies.rotation, b, j)
     n = qt.cross(x, y)
@@ -162,8 +163,8 @@ def _add_edge_contact(a, b, edges, gap, h, many):
 def collide_blocks(a, b, margin, h, many):
     """Add the contacts of blocks a and b that are at most `margin` [m] apart.
 
-    Where a face separates them or nearly does, and something of the other block is above it, no product of edges can
-    say that they are further apart: that something touches.
+    If a face separates the blocks, or nearly does, and a part of the other block is above it, no product of edges can
+    have a larger distance: that part touches.
     """
     write_relative_axes(a, b, many)
     apart, face = max_box_face_separation(a, b, margin, many)

@@ -1,4 +1,4 @@
-"""The face of a block that looks against a face of another one, clipped by the sides of that.
+"""Clip the face of a block that is opposite to a face of another block by the sides of that face.
 
 The polygon is in the frame of the other block's face: coordinates along it, and height above the block's centre. Every
 vertex knows the edges into and out of it, which name it while the same edges cross.
@@ -37,10 +37,10 @@ def is_polygon_inside(source, count, axis, sign, bound, many):
 
 @inlined
 def clip_polygon(source, count, axis, sign, bound, side, slop, many):
-    """Clip the polygon in copy `source` by sign * coordinate <= bound; its vertices, now in the other copy.
+    """Clip the polygon in copy `source` by sign * coordinate <= bound; return its vertices, now in the other copy.
 
-    A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
-    together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
+    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
+    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0
@@ -64,7 +64,7 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
 
 @inlined
 def write_incident_face(r, o, axis, sign, many):
-    """Write the face of block o that looks most against the face of block r into copy 0, in the frame of that face.
+    """Write the face of block o most opposite to the face of block r into copy 0, in the frame of that face.
 
     Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
     """
@@ -93,15 +93,15 @@ def write_incident_face(r, o, axis, sign, many):
 
 @inlined
 def clamp_to_half_width(s, bound):
-    """s, no further than `bound` from 0."""
+    """Number s, limited to at most `bound` from 0."""
     return min(max(s, -bound), bound)
 
 
 @inlined
 def keep_deepest_vertex(x, y, many):
-    """Leave the lowest vertex of copy 0, moved above the face of half edges x and y: the copy it is in.
+    """Keep only the lowest vertex of copy 0, moved above the face of half edges x and y; return its copy.
 
-    For blocks that are apart beside each other as well: the plane between them keeps them from each other all the same.
+    This serves blocks that are apart sideways as well, since the plane between them still separates them.
     """
     p, edge, low = many.narrowphase.polygon, many.narrowphase.edge, 0
     for k in range(4):
@@ -127,10 +127,10 @@ def min_vertex_height(source, count, polygon):
 
 @inlined
 def find_rim_edge(d, axis, source, count, slop, many):
-    """(its ends, axis of the rim, its sense) where all that is low of the polygon is an edge along the face's rim.
+    """Edge along the face's rim that holds all low vertices of the polygon: (its ends, axis of the rim, its sense).
 
-    What is within a slop of the lowest vertex is low; two slops from the rim are on it. Without such an edge the ends
-    are -1.
+    Vertices within a slop of the lowest one are low, and vertices within two slops of the rim are on it. Without such
+    an edge the ends are -1.
     """
     p, low = many.narrowphase.polygon, min_vertex_height(source, count, many.narrowphase.polygon)
     for side in range(4):

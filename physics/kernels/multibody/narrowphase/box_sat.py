@@ -33,7 +33,7 @@ def body_axis(R, b, k):
 
 @inlined
 def write_relative_axes(a, b, many):
-    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, the way from a to b in both."""
+    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, vector from a to b in both."""
     R, mix, place = many.bodies.rotation, many.narrowphase.relative_axes, many.bodies.center
     for i in range(3):
         for j in range(3):
@@ -47,9 +47,9 @@ def write_relative_axes(a, b, many):
 
 @inlined
 def max_box_face_separation(a, b, margin, many):
-    """(separation, face) of the face normal that separates most; the first block's unless the other's is better.
+    """(separation, face) of the most separating face normal; a tie goes to the first block.
 
-    One that separates by more than `margin` [m] is enough.
+    The search stops at a face that separates by more than `margin` [m].
     """
     S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.work[a].dims, many.bodies.work[b].dims
     way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
@@ -72,7 +72,7 @@ def max_box_face_separation(a, b, margin, many):
 
 @inlined
 def max_box_edge_separation(a, b, margin, many):
-    """(separation, 3 i + j) of edges i of a and j of b whose product separates most; as `max_box_face_separation`."""
+    """(separation, 3 i + j) of edges i of a and j of b that separate most; ties as `max_box_face_separation`."""
     C, S, way = (
         many.narrowphase.relative_axes[AXES],
         many.narrowphase.relative_axes[SIZES],
@@ -110,8 +110,8 @@ def is_face_flat_on_other(face, many):
 def is_edge_axis_face_normal(edges, face, many):
     """True if the product of two edges is nearly a face normal: the faces then lie flat on each other.
 
-    Both turned towards the other block's centre: of slender blocks that cross far from their centres, the face that
-    looks there may be on the far side of the one that touches.
+    Both normals point towards the other block's centre. For slender blocks that cross far from their centres, the face
+    that looks there may be on the far side of the touching one.
     """
     C, i, j, way = (
         many.narrowphase.relative_axes[AXES],

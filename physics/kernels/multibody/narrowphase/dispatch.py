@@ -1,4 +1,4 @@
-"""Narrow phase: the contacts of every body with every wall, and of every pair that is near."""
+"""Narrow phase: contacts of every body with every wall, and of every near pair."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from physics.kernels.state.sleeping import is_asleep
 
 @shared_kernel
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
-    """Write the contact set of the bodies where they are, for a stage of length h.
+    """Write the contact set of the bodies in their present state, for a stage of length h.
 
-    `ellipsoids` and `hulls` are None where the scene has none, `sleep` where it does not declare it. What sleeps
-    and comes near nothing is left out.
+    `ellipsoids` and `hulls` are None if the scene has none, `sleep` if it does not declare it. Sleeping bodies that
+    nothing approaches are left out.
     """
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = many.counts[NUM_STOPPING] = 0
     bodies = many.bodies.work

@@ -1,4 +1,4 @@
-"""An ellipsoid and another convex body: how far they are apart, by Newton's method on the direction between them.
+"""Separation of an ellipsoid and another convex body, by Newton's method on the direction between them.
 
 With support functions s(n) of the two bodies about their centres (both symmetric) and d from the centre of b to that
 of a, the bodies are apart along the unit vector n by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their distance or,
@@ -76,7 +76,7 @@ def _signed(x):
 
 @inlined
 def support_separation(A, is_block, B, dims, d, n):
-    """σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
+    """Separation σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
     s, _ = ellipsoid_support_point(A, n)
     if is_block:
         return qt.dot(n, d) - s - (dims[0] * abs(n[0]) + dims[1] * abs(n[1]) + dims[2] * abs(n[2]))
@@ -86,19 +86,19 @@ def support_separation(A, is_block, B, dims, d, n):
 
 @inlined
 def _reduced_gradient(free, size):
-    """Reduce one component of the gradient where nᵢ = 0, for a half edge `size`: 0 keeps it there."""
+    """Reduced gradient in a component with nᵢ = 0, for a half edge `size`; 0 keeps the component there."""
     return free - math.copysign(size, free) if abs(free) > size else 0.0
 
 
 @inlined
 def _step_to_kink(x, dx, t):
-    """The share t of a step dx that component x of the direction can take until it is 0."""
+    """Share t of a step dx at which component x of the direction reaches 0."""
     return min(t, -x / dx) if x * (x + t * dx) < 0.0 else t
 
 
 @inlined
 def _step_component(x, dx, t, at_kink):
-    """Component x of the direction after t dx: exactly 0 where that is where its kink is."""
+    """Component x of the direction after t dx; exactly 0 at its kink."""
     return 0.0 if at_kink and x * dx < 0.0 and -x / dx <= t else x + t * dx
 
 
@@ -203,7 +203,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
 
 @inlined
 def center_direction(d):
-    """Direction from the centre of b, the origin, to that of a; any where they are the same."""
+    """Direction from the centre of b, the origin, to that of a; any direction if they coincide."""
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:
         return (d[0] / size, d[1] / size, d[2] / size)
@@ -250,7 +250,7 @@ def relative_rotation(R, S):
 
 @kernel
 def collide_ellipsoid(a, b, margin, h, many):
-    """Add the contact of an ellipsoid and any body, whichever of the two is a; in the frame of the other one."""
+    """Add the contact of an ellipsoid and any body, in either order, in the frame of the other body."""
     first, second = a, b
     if many.bodies.work[a].shape != ELLIPSOID:
         first, second = b, a

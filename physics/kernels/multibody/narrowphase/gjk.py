@@ -1,4 +1,4 @@
-"""Distance of two convex bodies at any places: Gilbert, Johnson and Keerthi's algorithm on support functions.
+"""Distance of two convex bodies in any poses, by Gilbert, Johnson and Keerthi's algorithm on support functions.
 
 The differences of points of the two fill a convex body A - B; its point v nearest to the origin is sought. Each round
 adds its corner w farthest against v to a simplex and takes the point of that nearest to the origin. Along n = v/|v| the
@@ -40,7 +40,7 @@ def hull_support_vertex(b, k, many):
 
 @inlined
 def support_point(b, x, R, k, thinner, hulls, many):
-    """Point of body b that is farthest along k, a unit vector, for its geometric centre at x and rotation R [m].
+    """Farthest point of body b along k, a unit vector, for its geometric centre at x and rotation R [m].
 
     The body is taken thinner by `thinner` [m] on all sides.
     """
@@ -71,7 +71,7 @@ def _core_point(b, x, R, k, thinner, hulls, many):
 
 @inlined
 def _difference_point(a, b, poses, v, thinner, hulls, many):
-    """Corner of A - B that is farthest against v, for the poses of both."""
+    """Farthest corner of A - B against v, for the poses of both."""
     one, other = poses
     x, y = subtract(one[0], other[0]), (0.0, 0.0, 0.0)
     return subtract(
@@ -82,10 +82,10 @@ def _difference_point(a, b, poses, v, thinner, hulls, many):
 
 @kernel
 def closest_on_simplex(count, many):
-    """Point nearest the origin of the simplex of the first `count` corners in `narrowphase.simplex` and the next one.
+    """Point nearest the origin of a simplex: the first `count` corners in `narrowphase.simplex` and the next one.
 
-    Only those corners stay of which it is made: (point, how many). The new one is one of them, since the point comes
-    nearer with it than without. (0, 0, 0) inside a tetrahedron.
+    Only the corners that form the point stay: (point, their number). The new corner is one of them, since the point
+    comes nearer with it than without. (0, 0, 0) inside a tetrahedron.
     """
     S = many.narrowphase.simplex
     w = row_vector(S, count, 0)
@@ -138,7 +138,7 @@ def _core_radius(b, thinner, many):
 
 @kernel
 def gjk_distance(a, b, now, later, way, touch, thinner, hulls, many):
-    """Distance of body a from body b in their poses, or a bound that is nearly it: (direction out of b, distance).
+    """Distance of body a from body b in their poses, or a close bound: (direction out of b, distance).
 
     Parameters
     ----------

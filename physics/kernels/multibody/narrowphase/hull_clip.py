@@ -1,4 +1,4 @@
-"""The face of one convex polyhedron that looks against a face of another, clipped by the sides of that one.
+"""Clip the face of a convex polyhedron that is opposite to a face of another by the sides of that face.
 
 References
 ----------
@@ -34,8 +34,8 @@ def _side_plane(which, ring, k, first, last, out, hulls):
 def _clip_polygon(source, count, m, bound, side, slop, hulls):
     """Clip the polygon in copy `source` by m·x <= bound: (its copy, its vertices).
 
-    A vertex no further than the slop outside stays: it would otherwise come and go with rounding where two faces end
-    together. It stands for the crossing of its edge then, which may be far off along an edge that the side hardly cuts.
+    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
+    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
@@ -71,10 +71,10 @@ def _has_corner(f, corner, hulls):
 
 @inlined
 def write_hull_incident_face(which, o, out, many):
-    """Write a face of body o, number `which` of the pair, into copy 0: its vertices.
+    """Write a face of body o, number `which` of the pair, into copy 0; return its vertices.
 
-    Of the faces with the corner that reaches furthest against `out` the one that looks most against it: the face that
-    does so of all need not have that corner.
+    The face is the one most opposite to `out` among the faces with the farthest corner against `out`. The most opposite
+    of all faces need not have that corner.
     """
     hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):
@@ -96,7 +96,7 @@ def write_hull_incident_face(which, o, out, many):
 
 @inlined
 def clip_incident_face(which, r, o, face, slop, many):
-    """Clip the face of body o that looks against this one of body r, number `which`, by its sides: (copy, vertices)."""
+    """Clip the face of body o opposite to this one of body r, number `which`, by its sides: (copy, vertices)."""
     hulls = many.narrowphase.hulls
     out = row_vector(hulls.normal[which], face, 0)
     source, count = 0, write_hull_incident_face(1 - which, o, out, many)

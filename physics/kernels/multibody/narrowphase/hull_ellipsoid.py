@@ -40,8 +40,9 @@ _NO_ELLIPSOID = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 def nearest_on_hull(b, x, many):
     """(nearest point of the surface, outward normal, distance) for a point x of body b, number 0 of the pair.
 
-    Inside the way out is by the nearest face, and the distance negative. Outside the nearest point is on a face that
-    looks towards x: of the normals that meet there, which x - y is made of, at least one does.
+    Inside, the shortest way out is through the nearest face, and the distance is negative. Outside, the nearest point y
+    is on a face that looks towards x: x - y is a combination of the normals that meet there, so at least one of them
+    points towards x.
     """
     hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     for f in range(hulls.of[b, LAST_FACE] - hulls.of[b, FIRST_FACE]):
@@ -65,7 +66,7 @@ def nearest_on_hull(b, x, many):
 
 @kernel
 def collide_sphere_hull(a, b, margin, h, many):
-    """Add the contact of a sphere and a hull, whichever of the two is a."""
+    """Add the contact of a sphere and a hull, in either order."""
     ball, hull = a, b
     if many.bodies.work[b].shape == SPHERE:
         ball, hull = b, a
@@ -89,7 +90,7 @@ def _separation(hull, A, way, n, many):
 
 @inlined
 def _direction_from_edge(e, hull, S, dims, way, many):
-    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull alone.
+    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull.
 
     That is a block without width and height: `max_separation_direction` in the frame of the edge.
     """
@@ -109,12 +110,12 @@ def _direction_from_edge(e, hull, S, dims, way, many):
 
 @kernel
 def collide_ellipsoid_hull(a, b, margin, h, many):
-    """Add the contact of an ellipsoid and a hull, whichever of the two is a.
+    """Add the contact of an ellipsoid and a hull, in either order.
 
-    The direction is that of the largest separation, as in `ellipsoid_distance`. Where the ellipsoid's point over the
-    face that is furthest from it is above that face, this is the nearest; if not, the nearest point of the hull is on
-    an edge. All directions so found are measured against the whole hull, and the best is taken: where the two are apart
-    it is the one there is; where they overlap none of the edges may be, and a face is the way out.
+    The direction is that of the largest separation, as in `ellipsoid_distance`. Consider the face farthest from the
+    ellipsoid, and the ellipsoid's point over it. If this point is above the face, it is the nearest; if not, the
+    nearest point of the hull is on an edge. All directions found are measured against the whole hull, and the best is
+    taken. If the two are apart this is the right one. If they overlap, edges may fail, and a face is the way out.
     """
     round_, hull = a, b
     if many.bodies.work[b].shape == ELLIPSOID:

@@ -45,9 +45,9 @@ _FIRST_EDGE_FEATURE = 2 * _MAX_FACES * 4 * CLIP_SIDE_OFFSET * CLIP_SIDE_OFFSET
 
 @inlined
 def max_hull_face_separation(which, b, other, far, many):
-    """(separation, face) of the face of body b, number `which` of the pair, that is furthest from the body `other`.
+    """(separation, face) of the face of body b, number `which` of the pair, that is farthest from the body `other`.
 
-    Beyond `far` nothing more is looked for: that is too far already.
+    The search stops at a face farther than `far`, which is too far already.
     """
     hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     count = hulls.of[other, LAST_CORNER] - hulls.of[other, FIRST_CORNER]
@@ -76,10 +76,10 @@ def hull_edge(which, b, e, many):
 
 @inlined
 def _is_minkowski_face(d, left, right, e, other_left, other_right):
-    """True if the arc between the normals of an edge crosses that between the opposite normals of another edge.
+    """True if the arc between an edge's normals crosses the arc between the opposite normals of another edge.
 
-    The arc's great circle is perpendicular to the edge: its ends must be on both sides of the other's circle, and the
-    other way round, on the same hemisphere.
+    The arc's great circle is perpendicular to the edge. So the arcs cross if the ends of each lie on both sides of the
+    other's circle, and on the same hemisphere.
     """
     c, f = qt.dot(d, other_left), qt.dot(d, other_right)
     a, b = qt.dot(e, left), qt.dot(e, right)
@@ -88,7 +88,7 @@ def _is_minkowski_face(d, left, right, e, other_left, other_right):
 
 @inlined
 def max_hull_edge_separation(a, b, many):
-    """(separation, number of the edge of a, of b) of the two edges that separate most, -inf if there are none."""
+    """(separation, edge of a, edge of b) of the two most separating edges; -inf if there are none."""
     hulls, best, first, second = many.narrowphase.hulls, -math.inf, 0, 0
     inside = row_vector(hulls.centre, 0, 0)
     for i in range(hulls.of[a, LAST_EDGE] - hulls.of[a, FIRST_EDGE]):
@@ -121,9 +121,9 @@ def _edge_normal(a, b, i, j, many):
 
 @inlined
 def _keep_deepest_vertex(which, r, o, face, many):
-    """Leave the vertex of the face against this one that is lowest in copy 0, moved above this one: (copy, vertices).
+    """Keep only the lowest vertex in copy 0 of the opposite face, moved above this face: (copy, vertices).
 
-    For bodies that are apart beside each other as well: the plane between them keeps them from each other all the same.
+    This serves bodies that are apart sideways as well, since the plane between them still separates them.
     """
     hulls, low = many.narrowphase.hulls, 0
     out = row_vector(hulls.normal[which], face, 0)
@@ -140,7 +140,7 @@ def _keep_deepest_vertex(which, r, o, face, many):
 
 @inlined
 def _clipped_height(which, face, source, count, many):
-    """Height of the lowest vertex of the clipped polygon above a face; inf where there is none."""
+    """Height of the lowest vertex of the clipped polygon above a face; inf for an empty polygon."""
     out, low = row_vector(many.narrowphase.hulls.normal[which], face, 0), math.inf
     for k in range(count):
         low = min(low, qt.dot(out, row_vector(many.narrowphase.hulls.polygon[source], k, 0)))
@@ -167,7 +167,7 @@ def _add_face_contacts(a, b, which, face, source, count, least, h, many):
 
 @inlined
 def _add_edge_contact(a, b, i, j, n, gap, h, many):
-    """The contact of edges i of a and j of b, n out of a, at their nearest points."""
+    """Add the contact of edges i of a and j of b, n out of a, at their nearest points."""
     origin = row_vector(many.bodies.center, a, 0)
     p, d, _, _ = hull_edge(0, a, i, many)
     q, e, _, _ = hull_edge(1, b, j, many)
@@ -185,12 +185,12 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
 def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
-    Where a face separates them or nearly does, and something of the other body is above it, no pair of edges can say
-    that they are further apart: that something touches. Where edges do say so, and lie nearly flat on that face, what
-    is above it touches, as far away as the edges say, unless it is further away itself.
+    If a face separates the bodies, or nearly does, and a part of the other body is above it, no pair of edges can have
+    a larger distance: that part touches. If edges do have a larger distance, and lie nearly flat on that face, the part
+    above it touches at the edges' distance, unless it is farther away itself.
 
-    The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: what
-    is equal must not change with rounding.
+    The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: a
+    choice between equals must not change with rounding.
     """
     origin, slop = row_vector(many.bodies.center, a, 0), pair_slop(a, b, many)
     pose_hull(0, a, origin, many)

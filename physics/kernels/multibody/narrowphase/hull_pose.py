@@ -1,4 +1,4 @@
-"""Convex polyhedra in place: a pair of them out of `hull_tables`, and nearest points of their faces."""
+"""Convex polyhedra in the world: a pair of them from `hull_tables`, and nearest points of their faces."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def hull_scale(b, many):
 
 @inlined
 def corner_arm(b, k, many):
-    """Corner k of the tables, of body b, from its place, world frame [m]."""
+    """Corner k of the tables, relative to the position of body b, world frame [m]."""
     r, s = row_vector(many.narrowphase.hulls.corners, k, 0), hull_scale(b, many)
     return qt.matvec(row_matrix(many.bodies.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
 
@@ -53,7 +53,7 @@ def nearest_on_segment(x, p, q):
 
 @kernel
 def is_above_face(which, b, face, x, many):
-    """True if a face of body b, number `which` of the pair, has a normal through x, above or below."""
+    """True if the normal of a face of body b, number `which` of the pair, passes through x, above or below."""
     hulls = many.narrowphase.hulls
     out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]

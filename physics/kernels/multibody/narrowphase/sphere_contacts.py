@@ -33,7 +33,7 @@ def collide_spheres(a, b, margin, h, many):
 
 @inlined
 def collide_sphere_block(a, b, margin, h, many):
-    """Add the contact of a sphere and a block, whichever of the two is a."""
+    """Add the contact of a sphere and a block, in either order."""
     ball, brick = a, b
     if many.bodies.work[a].shape == BLOCK:
         ball, brick = b, a

@@ -1,4 +1,4 @@
-"""Linear systems with one 6 x 6 block for every two bodies that touch: block LU in the order of `minimum_degree`.
+"""Linear systems with one 6 x 6 block for every touching pair: block LU in the order of `minimum_degree`.
 
 Body b has its block on the diagonal in `diagonal[b]`, and with each later neighbour c = column[k], start[b] <= k <
 stop[b], the blocks `lower[k]` (row c, column b) and `upper[k]` (row b, column c). Elimination of b takes
@@ -112,7 +112,7 @@ def _component(x, p):
 
 @inlined
 def _with_component(x, p, value):
-    """Column x with another number p."""
+    """Column x with number p replaced."""
     if p < 3:
         return select_lanes(_lane_index(p), value, x[0]), x[1]
     return x[0], select_lanes(_lane_index(p - 3), value, x[1])
@@ -120,7 +120,7 @@ def _with_component(x, p, value):
 
 @inlined
 def _max_below_pivot(x, p):
-    """Largest of the numbers behind number p of a column x, without their signs."""
+    """Largest absolute value of the numbers behind number p of a column x."""
     if p < 3:
         return max_of_lanes(larger(select_lanes(_lanes_after(p), abs(x[0]), 0.0), abs(x[1])))
     return max_of_lanes(select_lanes(_lanes_after(p - 3), abs(x[1]), 0.0))
@@ -128,16 +128,16 @@ def _max_below_pivot(x, p):
 
 @inlined
 def _eliminate_column(y, p, s, x):
-    """Column y after row p of the block was made s times what it was, and taken off the others."""
+    """Column y after row p of the block was scaled by s and subtracted from the other rows."""
     t = s * _component(y, p)
     return _with_component((y[0] - t * x[0], y[1] - t * x[1]), p, t)
 
 
 @inlined
 def _gauss_jordan_step(p, least, x, a, b, c, d, e):
-    """One step of Gauss and Jordan: column p, which is x, is the pivot's; the others follow it around.
+    """Do one Gauss-Jordan step: column p, which is x, has the pivot; the others rotate past it.
 
-    Returns what pivots are above what they have to be, at least; the others, and x last.
+    Returns the pivots' least margin above their allowed size; the other columns, and x last.
     """
     value = _component(x, p)
     s = 1.0 / value
@@ -156,7 +156,7 @@ def _gauss_jordan_step(p, least, x, a, b, c, d, e):
 
 @inlined
 def _invert_unpivoted(A, k):
-    """Invert block A[k] in place if its pivots may be those on the diagonal; whether they may."""
+    """Invert block A[k] in place with pivots on the diagonal; return whether these were large enough."""
     X = block_columns(A, k)
     a, b, c, d, e, f = (X[0], X[1]), (X[2], X[3]), (X[4], X[5]), (X[6], X[7]), (X[8], X[9]), (X[10], X[11])
     least, b, c, d, e, f, a = _gauss_jordan_step(0, 1.0e300, a, b, c, d, e, f)

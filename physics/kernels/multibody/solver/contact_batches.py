@@ -1,8 +1,8 @@
-"""Batches: up to four contacts of the same two bodies, a lane each, for the methods with a linear system.
+"""Batches of up to four contacts of the same two bodies, a lane each, for methods with a linear system.
 
-Two blocks touch with a face, and what is asked of its contacts is the same for each of them; what they do to their
-bodies is a sum. So twists are read once for four contacts, and forces, moments and blocks of the system are summed
-before anything is written. A lane that is left over repeats the last contact, and weighs nothing.
+Two blocks touch with a face. All its contacts need the same computation, and their effects on the bodies add up. So
+twists are read once for four contacts, and forces, moments and blocks of the system are summed before anything is
+written. A lane that is left over repeats the last contact, and weighs nothing.
 
 What is known of contacts is copied here, with the bodies' block of the system, when an island is prepared: field f of a
 batch is `many.newton.lanes[g, 4 f : 4 f + 4]`.
@@ -70,7 +70,7 @@ def put_batch_field(g, field, x, many):
 
 @inlined
 def batch_vector(g, field, many):
-    """Three fields of batch g: of each contact a vector."""
+    """Vector of each contact of batch g, from three fields."""
     return batch_field(g, field, many), batch_field(g, field + 1, many), batch_field(g, field + 2, many)
 
 
@@ -95,7 +95,7 @@ def batch_frames(g, many):
 
 @inlined
 def _fill_batch(g, i, n, many):
-    """Copy what is known of the n contacts from place i of the queue on into batch g."""
+    """Copy data of the n contacts from place i of the queue on into batch g."""
     L = many.newton.lanes
     for lane in range(LANE_COUNT):
         k = many.islands.contacts[i + min(lane, n - 1)]
@@ -117,7 +117,7 @@ def _fill_batch(g, i, n, many):
 
 @kernel
 def batch_contacts(first, last, many):
-    """Batch the contacts `many.islands.contacts[first:last]` of an island of ordered bodies; whether they fit."""
+    """Batch the contacts `many.islands.contacts[first:last]` of an ordered island; return whether they fit."""
     count, i = 0, first
     while i < last:
         a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
@@ -188,7 +188,7 @@ def batch_velocity(g, t, spin, many):
 
 @inlined
 def batch_velocity_error(g, many):
-    """u of the contacts of batch g less their targets."""
+    """Velocities u of the contacts of batch g minus their targets."""
     u, t = batch_velocity(g, many.bodies.twist, 3, many), batch_vector(g, LANE_TARGET, many)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
@@ -225,7 +225,7 @@ def planar_length(x, y):
 
 @inlined
 def project_on_disks(x, y, limit):
-    """(x, y), shortened to `limit` where it is longer."""
+    """Vector (x, y), shortened to `limit` if it is longer."""
     size = planar_length(x, y)
     s = select_lanes(size > limit, limit / size, 1.0)
     return s * x, s * y

@@ -33,7 +33,7 @@ def apply_contact_impulse(k, local, t, many):
 
 @inlined
 def apply_world_impulse(k, p, t, many):
-    """The same for an impulse in the world frame."""
+    """Change the twists t of both bodies by an impulse of contact k, given in the world frame [N s]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     put_vector(t, a, 0, add_scaled(row_vector(t, a, 0), many.bodies.inv_mass[a], p))
     put_vector(
@@ -60,7 +60,7 @@ def apply_world_impulse(k, p, t, many):
 
 @inlined
 def _add_mobility(k, b, first, W, many):
-    """W plus what one end adds to the contact's own block: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
+    """Block W plus the mobility of one end: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
     r, E = row_vector(many.contacts.arm, k, first), many.contacts.frame
     g0, g1, g2 = qt.cross(r, row_vector(E, k, 0)), qt.cross(r, row_vector(E, k, 3)), qt.cross(r, row_vector(E, k, 6))
     h0, h1, h2 = (
@@ -77,7 +77,7 @@ def _add_mobility(k, b, first, W, many):
 
 @kernel
 def assemble_contact_blocks(n, many):
-    """Write every contact's own block; the twists hold the warm start's impulses afterwards. Returns the scale.
+    """Write every contact's own block; return the scale. The twists then include the warm start's impulses.
 
     The scale is the largest velocity that a contact would have without any impulse [m/s].
     """
@@ -102,14 +102,14 @@ def assemble_contact_blocks(n, many):
 
 @inlined
 def velocity_error(k, many):
-    """u of contact k less its target."""
+    """Velocity u of contact k minus its target."""
     u, t = contact_velocity(k, many), row_vector(many.contacts.target, k, 0)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
 
 @inlined
 def project_on_disk(x, y, limit):
-    """(x, y), shortened to `limit` if it is longer."""
+    """Vector (x, y), shortened to `limit` if it is longer."""
     size = math.sqrt(x * x + y * y)
     if size > limit:
         return x * (limit / size), y * (limit / size)
@@ -131,7 +131,7 @@ def _normal_map(p, u, W):
 
 @inlined
 def contact_residual(k, many):
-    """Natural-map residual of contact k, its impulse as it is [m/s]."""
+    """Natural-map residual of contact k at its present impulse [m/s]."""
     return natural_map_residual(
         row_vector(many.contacts.impulse, k, 0),
         velocity_error(k, many),

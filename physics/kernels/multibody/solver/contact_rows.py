@@ -1,4 +1,4 @@
-"""Contacts as sweeps visit them: all that a visit reads stands in one row, in the order of the visits.
+"""Contacts for sweeps: one row has all data of a visit, in the order of the visits.
 
 A visit of one contact asks for some forty numbers and changes two bodies. For the frame E, the arms r, s from the
 bodies a, b, and impulses p in the frame,
@@ -63,7 +63,7 @@ def write_visits(first, last, many):
 
 @inlined
 def read_visit_impulses(first, last, many):
-    """Impulses of the contacts `many.islands.contacts[first:last]` from their visits."""
+    """Copy impulses of the contacts `many.islands.contacts[first:last]` from their visits."""
     for i in range(first, last):
         put_vector(
             many.contacts.impulse,
@@ -92,7 +92,7 @@ def write_block_inverse(i, W, many):
 
 @inlined
 def visit_velocity_error(i, many):
-    """u of visit i less its target."""
+    """Velocity u of visit i minus its target."""
     t, a, b = many.sweeps.motion, many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1]
     v = add_scaled(
         row_vector(t, a, 0),

@@ -67,7 +67,7 @@ _NO_HISTORY = -2
 
 @inlined
 def _is_up_to_date(i, a, b, many):
-    """True if neither of two bodies (b < 0: a wall) has been pushed since the last visit i."""
+    """True if neither of two bodies (b < 0: a wall) has been pushed since visit i."""
     return many.sweeps.visited[i] >= many.sweeps.pushed[a] and (
         b < 0 or many.sweeps.visited[i] >= many.sweeps.pushed[b]
     )
@@ -89,7 +89,7 @@ def _mark_pushed(a, b, visit, many):
 
 @inlined
 def relax_normal_impulse(k, visit, small, many):
-    """Answer contact k along its normal if it is off by more than `small`: its error before, as a velocity [m/s].
+    """Correct contact k along its normal if its error exceeds `small`; return the error before, as a velocity [m/s].
 
     `visit` is the number of this visit.
     """
@@ -108,8 +108,8 @@ def relax_normal_impulse(k, visit, small, many):
 def sweep_normals(first, last, residual, goal, limit, many):
     """`sweep_contacts` without friction: impulses along the normals only.
 
-    A contact that has been answered is passed over until a body of it has been pushed again, and it is not answered
-    where what it is off by is a small share of the goal: where little is to be done, few contacts are visited.
+    A corrected contact is skipped until one of its bodies has been pushed again. A contact whose error is a small share
+    of the goal is not corrected. So small problems visit few contacts.
     """
     sweeps = visits = 0
     for i in range(first, last):
@@ -137,7 +137,7 @@ def sweep_normals(first, last, residual, goal, limit, many):
 
 @inlined
 def _solve_one_contact(W, V, mu, step, p, u, goal):
-    """Impulse of a contact that answers its own velocity u, all others held; W and its inverse V are symmetric."""
+    """Impulse of a contact that answers its own velocity u, others fixed; W and its inverse V are symmetric."""
     own = qt.symmetric_matvec(W, p)
     b = subtract(u, own)
     if b[0] >= 0.0:
@@ -160,7 +160,7 @@ def _solve_one_contact(W, V, mu, step, p, u, goal):
 
 @inlined
 def _as_velocity(i, d, many):
-    """A change d of an impulse, as a velocity [m/s]."""
+    """Change d of an impulse, as a velocity [m/s]."""
     return max(
         abs(d[0]) * many.sweeps.visit_rows[i, VISIT_BLOCK],
         max(abs(d[1]), abs(d[2])) * many.sweeps.visit_rows[i, VISIT_LAMBDA_MAX],
@@ -169,7 +169,7 @@ def _as_velocity(i, d, many):
 
 @inlined
 def _save_history(i, p, marks, many):
-    """Keep the impulse of visit i as it was at two moments, if it has not been visited since then."""
+    """Store the impulse of visit i at two moments, if it has not been visited since."""
     if many.sweeps.visited[i] <= marks[0]:
         put_vector(many.sweeps.impulse_4_sweeps_ago, i, 0, p)
     if many.sweeps.visited[i] <= marks[1]:
@@ -178,7 +178,7 @@ def _save_history(i, p, marks, many):
 
 @inlined
 def _relax_contact(i, number, marks, small, many):
-    """Answer visit i if it is off by more than `small`, or has been seen to be: its error before [m/s].
+    """Correct visit i if its error exceeds `small`, or is flagged to; return the error before [m/s].
 
     The error is a velocity, the contact's residual or a little more. `number` is that of this visit.
     """
@@ -209,7 +209,7 @@ def _relax_contact(i, number, marks, small, many):
 
 @inlined
 def _contraction_ratio(count, marks, many):
-    """Ratio of the last change of the impulses to the one before, in the metric of W_nn; 0: not along it."""
+    """Ratio of the impulses' last change to the one before, in the metric of W_nn; 0 if they are not parallel."""
     product = square = 0.0
     for i in range(count):
         if many.sweeps.visited[i] <= marks[0]:
@@ -224,9 +224,9 @@ def _contraction_ratio(count, marks, many):
 
 @inlined
 def _extrapolate(count, ratio, number, marks, small, many):
-    """Add to the impulses the rest of the series of their last change, and bring them back into the cones.
+    """Add the rest of the series of their last change to the impulses, and project them into the cones.
 
-    The motion of the bodies follows.
+    The motion of the bodies is updated, too.
     """
     s = ratio / (1.0 - ratio)
     for i in range(count):
@@ -245,7 +245,7 @@ def _extrapolate(count, ratio, number, marks, small, many):
 
 @inlined
 def _flag_unsolved(count, small, many):
-    """The residual [m/s]. Who misses more than `small` is to be visited, others once a body of theirs moves."""
+    """Flag contacts whose error exceeds `small`, others once a body of theirs moves; return the residual [m/s]."""
     worst = 0.0
     for i in range(count):
         R = many.sweeps.visit_rows
@@ -265,7 +265,7 @@ def _flag_unsolved(count, small, many):
 
 @kernel
 def _sweep(count, is_up, visits, marks, small, many):
-    """One sweep over those that have to be visited: how far an impulse was off at most [m/s], and visits so far."""
+    """Sweep once over the flagged contacts: (largest error of an impulse [m/s], visits so far)."""
     worst = 0.0
     for j in range(count):
         i = j if is_up else count - 1 - j
@@ -277,7 +277,7 @@ def _sweep(count, is_up, visits, marks, small, many):
 
 @kernel
 def _sweep_until_solved(count, residual, goal, limit, many):
-    """Sweep until the residual is at most `goal`, or for so many visits: (visits, residual [m/s])."""
+    """Sweep until the residual is at most `goal`, or the visits are used up: (visits, residual [m/s])."""
     small, most, passes, visits, since, marks = _SKIP_SHARE * goal, limit * count, 0, 0, 0, (_NO_HISTORY, _NO_HISTORY)
     while not residual <= goal and visits < most and passes < _PASSES_PER_SWEEP * limit:
         if since == 0:
@@ -299,9 +299,9 @@ def _sweep_until_solved(count, residual, goal, limit, many):
 def sweep_contacts(first, last, friction, residual, goal, limit, many):
     """Improve the impulses of `many.islands.contacts[first:last]` by sweeps until the residual is at most `goal` [m/s].
 
-    `contacts.impulse` and `bodies.twist` belong to each other. They hold the start, whose residual is given, and
-    receive the result. Returns the number of sweeps, `limit` at most, and the residual of the result. As many visits as
-    there are contacts count as a sweep, fewer than that as one; the last begun is finished.
+    `contacts.impulse` and `bodies.twist` are consistent. They hold the start, whose residual is given, and receive the
+    result. Returns the number of sweeps, at most `limit`, and the residual of the result. n visits for n contacts count
+    as a sweep, and so do fewer; the last sweep begun is finished.
     """
     if friction is None:
         return sweep_normals(first, last, residual, goal, limit, many)

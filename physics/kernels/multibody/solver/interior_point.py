@@ -1,4 +1,4 @@
-"""An interior-point method for the contact problem of an island: hard ones, whatever the start.
+"""Interior-point method for hard contact problems of an island, from any start.
 
 With p̂ = (μ p_n, p_t) and û = (u_n/μ + |u_t|, u_t) Coulomb's law is û ∈ L, p̂ ∈ L, p̂ ∘ û = 0 for the Lorentz cone L
 (De Saxcé's change of variables) [1]_. The method keeps both inside L and lets p̂ ∘ û shrink to nothing evenly: each
@@ -6,9 +6,9 @@ iteration is one Newton step for
 
     x = M⁻¹ Jᵀ p,    û = S (J x + b) + |û_t| e,    p̂ ∘ û = σ ν e,
 
-scaled as in `second_order_cone` (λ = W p̂ = W⁻¹ û), first with σ = 0 to see how far that leads, then with σ and the
-second-order term that this suggests (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the matrix
-unsymmetric, and its blocks are those of Newton's method on twists (`newton_system`). What counts is measured as
+scaled as in `second_order_cone` (λ = W p̂ = W⁻¹ û), first with σ = 0, which measures the possible step, then with the σ
+and the second-order term that follow from it (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the
+matrix unsymmetric, and its blocks are those of Newton's method on twists (`newton_system`). What counts is measured as
 everywhere, by the natural map.
 
 Where û_t is small its direction d turns with every step, and the matrix, with d in it, can be next to singular: steps
@@ -65,13 +65,13 @@ def _units(g, many):
 
 @inlined
 def _apply_units(s, a):
-    """S a."""
+    """Vector S a."""
     return (s[0] * a[0], s[1] * a[1], s[1] * a[2])
 
 
 @inlined
 def _unscaled_impulse(s, p):
-    """p of p̂."""
+    """Impulse p of the scaled p̂."""
     return (s[0] * p[0], s[1] * p[1], s[1] * p[2])
 
 
@@ -85,7 +85,7 @@ def _write_units(g, many):
 
 @inlined
 def _set_starting_point(start, many):
-    """Start inside the cones by about `start` [m/s], near the impulses as they are."""
+    """Set a start inside the cones by about `start` [m/s], near the present impulses."""
     for g in range(many.counts[NUM_BATCHES]):
         _write_units(g, many)
         s, p = _units(g, many), of.gather_batch(g, many.contacts.impulse, many)
@@ -136,7 +136,7 @@ def _scale_batch(g, share, many):
 
 @kernel
 def _prepare_predictor(part, share, many):
-    """Scalings, and the right side without what pushes off the boundary: (p̂·û of a contact, residual [m/s]).
+    """Prepare scalings, and the right side without the term that centres: (p̂·û of a contact, residual [m/s]).
 
     The matrix of the contacts, which `complete_matrix` completes.
     """
@@ -168,10 +168,10 @@ def _batch_twist_step(g, s, many):
 
 @inlined
 def _find_step_length(part, is_corrected, many):
-    """Changes that belong to `many.newton.change`, W dp̂ and dû; how far they lead, and p̂·û of a contact there.
+    """Compute the changes W dp̂ and dû for `many.newton.change`: (their largest step, p̂·û of a contact after it).
 
-    With f, what is in the batches if `is_corrected`, else 0, they satisfy W dp̂ + W⁻¹ dû = f - λ. The second number is
-    right where f is 0.
+    Let f be the vector in the batches if `is_corrected`, else 0. The changes satisfy W dp̂ + W⁻¹ dû = f - λ. The second
+    number is right only for f = 0.
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)
@@ -203,7 +203,7 @@ def _find_step_length(part, is_corrected, many):
 
 @inlined
 def _set_right_side(part, many):
-    """`many.change`: the right side that `_prepare_predictor` left."""
+    """Set `many.change` to the right side of `_prepare_predictor`."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(COLUMN_SIZE):
@@ -232,13 +232,13 @@ def _set_corrector(part, center, many):
 
 @inlined
 def _move_inside_cone(a):
-    """a, inside the cone."""
+    """Vector a, moved inside the cone."""
     return (larger(a[0], _INTERIOR_MARGIN * of.planar_length(a[1], a[2])), a[1], a[2])
 
 
 @inlined
 def _take_step(part, t, many):
-    """Go t of the way."""
+    """Take the share t of the step."""
     for g in range(many.counts[NUM_BATCHES]):
         dp = second_order_cone.apply_inv_scaling(_scaling_of(g, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many))
         of.put_batch_vector(
@@ -256,7 +256,7 @@ def _take_step(part, t, many):
 
 @inlined
 def _write_solution(part, many):
-    """The impulses, and the twists that belong to them."""
+    """Write the impulses, and the twists that they cause."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
@@ -269,7 +269,7 @@ def _write_solution(part, many):
 
 @kernel
 def interior_point_contacts(part, start, goal, limit, many):
-    """Improve the impulses of an island by at most `limit` iterations; how many were made.
+    """Improve the impulses of an island by at most `limit` iterations; return their number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Islands: groups of bodies that contacts connect, walls left out. Each is a contact problem of its own.
+"""Islands: groups of bodies connected by contacts, walls left out. Each is a contact problem of its own.
 
 Contacts and bodies are listed island by island, in the order in which they were before (union-find, then a counting
 sort), so that what one island costs does not depend on what happens in another.
@@ -14,7 +14,7 @@ from physics.kernels.math.union_find import find_root, unite_sets
 
 @inlined
 def union_contacts(n, many):
-    """Let `many.islands.parent` lead from every body to the first one that contacts connect it with."""
+    """Link every body to the first one of its island in `many.islands.parent`."""
     parent = many.islands.parent
     for b in range(parent.shape[0]):
         parent[b] = b
@@ -25,7 +25,7 @@ def union_contacts(n, many):
 
 @inlined
 def _list_contacts(n, many):
-    """Number the islands by their first contacts and list the contacts; how many islands there are."""
+    """Number the islands by their first contacts and list the contacts; return the number of islands."""
     island, begin, parent, count = many.islands.of_body, many.islands.first_contact, many.islands.parent, 0
     for b in range(island.shape[0]):
         island[b] = -1
@@ -71,7 +71,7 @@ def _list_bodies(count, many):
 
 @kernel
 def find_islands(n, many):
-    """Sort the n contacts into islands: how many there are.
+    """Sort the n contacts into islands; return the number of islands.
 
     Contacts of island i are `many.islands.contacts[first_contact[i] : first_contact[i + 1]]`, its bodies
     `many.islands.bodies[first_body[i] : first_body[i + 1]]`.

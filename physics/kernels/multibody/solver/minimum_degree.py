@@ -1,4 +1,4 @@
-"""In which order to eliminate the bodies of an island, and which 6 x 6 blocks that fills.
+"""Order of elimination of the bodies of an island, and the 6 x 6 blocks that it fills.
 
 Minimum degree: always the body with the fewest neighbours is next, and its neighbours become neighbours of each other.
 A tower, or bodies side by side on one plate, fill nothing whatever the numbers of their bodies; a heap fills little,
@@ -20,7 +20,7 @@ _NO_ENTRY = -1
 
 @inlined
 def _add_neighbour(a, b, many):
-    """Add b to the list of neighbours of a, at its front; whether there was room."""
+    """Add b to the front of a's list of neighbours; return whether there was room."""
     k = many.system.links[0]
     if k == many.system.neighbour.shape[0]:
         return False
@@ -32,7 +32,7 @@ def _add_neighbour(a, b, many):
 
 @inlined
 def _mark_neighbours(a, mark, many):
-    """Write `mark` to all neighbours of a that are not eliminated, and to a itself."""
+    """Write `mark` to a and to all its remaining neighbours."""
     many.system.mark[a] = mark
     k = many.system.head[a]
     while k != _NO_ENTRY:
@@ -42,7 +42,7 @@ def _mark_neighbours(a, mark, many):
 
 @inlined
 def _put_in_bucket(b, many):
-    """Put b at the front of the list of bodies of its degree."""
+    """Add b to the front of the list of bodies of its degree."""
     d = many.system.degree[b]
     many.system.ahead[b], many.system.behind[b] = _NO_ENTRY, many.system.bucket[d]
     if many.system.bucket[d] != _NO_ENTRY:
@@ -63,7 +63,7 @@ def _take_from_bucket(b, many):
 
 @inlined
 def _build_graph(first, last, begin, end, many):
-    """Neighbours of the bodies of one island, from its contacts; whether there was room."""
+    """Find the neighbours of an island's bodies from its contacts; return whether there was room."""
     many.system.links[0] = 0
     for i in range(begin, end):
         b = many.islands.bodies[i]
@@ -86,7 +86,7 @@ def _build_graph(first, last, begin, end, many):
 
 @inlined
 def _write_column(b, at, many):
-    """Write the neighbours of b that are left to `many.system.column` from `at` on; where they end, or -1: no room."""
+    """Write b's remaining neighbours to `many.system.column` from `at` on; return their end, or -1 without room."""
     k = many.system.head[b]
     while k != _NO_ENTRY:
         other = many.system.neighbour[k, 0]
@@ -101,7 +101,7 @@ def _write_column(b, at, many):
 
 @inlined
 def _eliminate_body(start, end, b, many):
-    """Take b from its neighbours `system.column[start:end]` and make them neighbours mutually; whether they fit."""
+    """Remove b from its neighbours `system.column[start:end]`, which become neighbours; return whether they fit."""
     for i in range(start, end):
         a = many.system.column[i]
         _take_from_bucket(a, many)

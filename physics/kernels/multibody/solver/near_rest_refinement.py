@@ -40,13 +40,13 @@ _NEAR_REST_SWEEPS = 4
 
 @inlined
 def _refined_tolerance(goal, least):
-    """Tolerance of the sweeps; velocities may change by twice as much where loads and impulses balance [m/s]."""
+    """Tolerance of the sweeps [m/s]; a balance of loads and impulses allows changes of velocity twice as large."""
     return max(BALANCE_SHARE * goal, least)
 
 
 @inlined
 def point_speed_bound(v, w, b, many):
-    """No point of body b is faster than this if it moves with v and turns with w [m/s]."""
+    """Bound of the speed of any point of body b that moves with v and turns with w [m/s]."""
     linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
     return linear + many.bodies.work[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
 
@@ -71,7 +71,7 @@ def _keeps_velocity(b, most, many):
 
 @kernel
 def is_in_balance(goal, least, many):
-    """True if nothing is left for `near_rest_refinement` to do in any island."""
+    """True if no island needs `near_rest_refinement`."""
     if many.settings[0].is_resting_stage == 1:
         for b in range(many.bodies.twist.shape[0]):
             if many.bodies.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _refined_tolerance(goal, least), many):
@@ -101,10 +101,10 @@ def _needs_refinement(part, speed, change, many):
 
 @kernel
 def refine_near_rest(part, friction, residual, goal, deep, least, many):
-    """Solve an island that is solved to the goal and nearly at rest further: (iterations, residual [m/s], method).
+    """Refine an island that is solved to the goal and nearly at rest: (iterations, residual [m/s], method).
 
-    To `deep` where all of it holds, else by some sweeps as far as `least`. Nothing happens outside resting stages, and
-    where that would make more of the residual than the goal.
+    An island of sticking contacts is solved to `deep`, another one by some sweeps as far as `least`. Nothing happens
+    outside resting stages, or if the residual would grow beyond the goal.
     """
     fine = _refined_tolerance(goal, least)
     if many.settings[0].is_resting_stage == 0 or not fine < residual <= goal:

@@ -1,4 +1,4 @@
-"""The system that `proximal_newton` solves: its defect x - M⁻¹ Jᵀ p(x), and its matrix 1 + M⁻¹ Jᵀ ρ p' J."""
+"""System of `proximal_newton`: its defect x - M⁻¹ Jᵀ p(x), and its matrix 1 + M⁻¹ Jᵀ ρ p' J."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from physics.kernels.multibody.solver.contact_batches import BATCH_BLOCK, BATCH_
 
 @inlined
 def project_impulse(y, mu):
-    """The impulses that `y` stands for: no pull, and the tangential part inside its disk."""
+    """Projection of `y` to admissible impulses: no pull, and the tangential part inside its disk."""
     normal = larger(y[0], 0.0)
     size, limit = of.planar_length(y[1], y[2]), mu * normal
     s = select_lanes(size > limit, limit / size, 1.0)
@@ -25,7 +25,7 @@ def project_impulse(y, mu):
 
 @inlined
 def subtract_twists(b, a, c, many):
-    """Column b of `many.newton.defect`: row b of twists a less that of twists c."""
+    """Set column b of `many.newton.defect` to row b of twists a minus that of twists c."""
     D = many.newton.defect
     D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
     D[b, ANGULAR_OFFSET], D[b, ANGULAR_OFFSET + 1], D[b, ANGULAR_OFFSET + 2] = (
@@ -37,9 +37,10 @@ def subtract_twists(b, a, c, many):
 
 @kernel
 def compute_defect(part, rho, all_hold, many):
-    """x - M⁻¹ Jᵀ p(x) of every body of an island into `many.newton.defect`, p(x) into the batches.
+    """Write x - M⁻¹ Jᵀ p(x) of an island's bodies into `many.newton.defect`, and p(x) into the batches.
 
-    Returns its norm by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ u.
+    Returns the defect's norm weighted by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ
+    u.
     """
     _, _, begin, end = part
     for i in range(begin, end):
@@ -81,7 +82,7 @@ def _projection_jacobian(y, mu):
 
 @inlined
 def _world_rows(D, E, weight):
-    """Rows of Eᵀ D E times `weight`: D is given in the frame whose axes are the rows of E."""
+    """Rows of Eᵀ D E times `weight`, with D given in the frame whose axes are the rows of E."""
     x = qt.transposed_matvec(D, (weight * E[0], weight * E[3], weight * E[6]))
     y = qt.transposed_matvec(D, (weight * E[1], weight * E[4], weight * E[7]))
     z = qt.transposed_matvec(D, (weight * E[2], weight * E[5], weight * E[8]))
@@ -90,7 +91,7 @@ def _world_rows(D, E, weight):
 
 @inlined
 def _sum(a):
-    """Sum of vectors of a batch, as half a column."""
+    """Sum of a batch's vectors, as half a column."""
     return lane_sums(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
@@ -108,7 +109,7 @@ def _sum_columns(A):
 
 @inlined
 def _moment_columns(r, A):
-    """Sums of r x each of three columns: their moments."""
+    """Moments of three columns: sums of r x each."""
     return _sum(qt.cross(r, A[0])), _sum(qt.cross(r, A[1])), _sum(qt.cross(r, A[2]))
 
 
@@ -126,7 +127,7 @@ def _add_columns(B, place, c, upper, lower):
 
 @inlined
 def _subtract_columns(B, place, c, upper, lower):
-    """Take halves of three columns off those of block B[place] from c on."""
+    """Subtract halves of three columns from those of block B[place] from c on."""
     first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
     store_lanes(B, place, first, load_lanes(B, place, first) - upper[0])
     store_lanes(B, place, first + ANGULAR_OFFSET, load_lanes(B, place, first + ANGULAR_OFFSET) - lower[0])
@@ -188,7 +189,7 @@ def _apply_inv_mass(B, place, b, many):
 
 @inlined
 def complete_matrix(begin, end, many):
-    """1 + M⁻¹ times what contacts have added."""
+    """Complete the matrix: 1 + M⁻¹ times the sum over contacts."""
     for i in range(begin, end):
         b = many.islands.bodies[i]
         _apply_inv_mass(many.system.diagonal, b, b, many)
@@ -201,7 +202,7 @@ def complete_matrix(begin, end, many):
 
 @kernel
 def assemble_newton_matrix(part, rho, all_hold, many):
-    """Newton's matrix of an island at the point of the last `compute_defect`."""
+    """Assemble Newton's matrix of an island at the point of the last `compute_defect`."""
     _, _, begin, end = part
     clear_system(begin, end, many)
     for g in range(many.counts[NUM_BATCHES]):

@@ -1,4 +1,4 @@
-"""Rows of the normals' Jacobian, and of M⁻¹ times it, for sweeps along the normals: a visit reads them as `lanes`.
+"""Rows of the normals' Jacobian J and of M⁻¹ Jᵀ, for sweeps along normals; a visit reads them as `lanes`.
 
 For the normal n of a contact and the arms r, s from its bodies
 
@@ -26,7 +26,7 @@ ROW_NORMAL, ROW_MOMENT_A, ROW_RESPONSE_A, ROW_MOMENT_B, ROW_RESPONSE_B = range(0
 
 @inlined
 def put_padded(array, i, j, a):
-    """Write a vector and its zero."""
+    """Write a vector followed by a zero."""
     store_lanes(array, i, j, Lanes(a[0], a[1], a[2], 0.0))
 
 
@@ -38,7 +38,7 @@ def _motion_from_twist(b, many):
 
 @inlined
 def body_twist_from_motion(b, many):
-    """The twist of body b from `many.sweeps.motion`."""
+    """Twist of body b from `many.sweeps.motion`."""
     put_vector(many.bodies.twist, b, 0, row_vector(many.sweeps.motion, b, 0))
     put_vector(many.bodies.twist, b, 3, row_vector(many.sweeps.motion, b, ANGULAR_OFFSET))
 
@@ -65,7 +65,7 @@ def twists_from_motion(first, last, many):
 
 @inlined
 def _normal_mobility(k, b, first, moment, many):
-    """Share of one end in W_nn of a contact; write its vectors of the normal to `many.sweeps.normal_rows`."""
+    """Share of one end in a contact's W_nn; writes its normal's vectors to `many.sweeps.normal_rows`."""
     g = qt.cross(row_vector(many.contacts.arm, k, first), row_vector(many.contacts.frame, k, 0))
     h = apply_body_inv_inertia(b, g, many)
     put_padded(many.sweeps.normal_rows, k, moment, g)
@@ -75,7 +75,7 @@ def _normal_mobility(k, b, first, moment, many):
 
 @inlined
 def assemble_normal_row(k, many):
-    """Write what only asks of the normal of contact k: W_nn and its row."""
+    """Write the data of contact k's normal: W_nn and its row."""
     put_padded(many.sweeps.normal_rows, k, ROW_NORMAL, row_vector(many.contacts.frame, k, 0))
     W = _normal_mobility(k, many.contacts.bodies[k, 0], 0, ROW_MOMENT_A, many)
     if many.contacts.bodies[k, 1] >= 0:
@@ -85,7 +85,7 @@ def assemble_normal_row(k, many):
 
 @inlined
 def normal_velocity(k, many):
-    """u_n of contact k."""
+    """Normal velocity u_n of contact k."""
     R, t, a, b = many.sweeps.normal_rows, many.sweeps.motion, many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     v = load_lanes(t, a, 0)
     if b >= 0:

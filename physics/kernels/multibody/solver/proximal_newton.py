@@ -1,4 +1,4 @@
-"""Contact problems on which sweeps crawl: Newton's method on the twists of all bodies, in a proximal-point iteration.
+"""Newton's method on the twists of all bodies, in a proximal-point iteration, for problems on which sweeps crawl.
 
 What `physics.kernels.contact_solver.proximal_newton` does for one body, for a world of them. With x the change of all
 twists, for impulses q near the solution let
@@ -60,7 +60,7 @@ MIN_NEWTON_STEPS = 12
 
 @inlined
 def _apply_newton_direction(part, many):
-    """Solve the factored system for the defect and take it off the twists."""
+    """Solve the factored system for the defect, and subtract the solution from the twists."""
     _, _, begin, end = part
     solve_factored(begin, end, many.newton.defect, many)
     for i in range(begin, end):
@@ -71,7 +71,7 @@ def _apply_newton_direction(part, many):
 
 @kernel
 def _newton_step(part, rho, norm, many):
-    """One damped Newton step on the twists from a defect of the given norm: the new (norm, largest velocity)."""
+    """Take one damped Newton step on the twists from a defect of the given norm: new (norm, largest velocity)."""
     _, _, begin, end = part
     assemble_newton_matrix(part, rho, False, many)
     factor_system(begin, end, many)
@@ -97,7 +97,7 @@ def _newton_step(part, rho, norm, many):
 
 @inlined
 def _apply_impulses(part, many):
-    """Impulses of the batches, also contact by contact, and twists from the free ones and them."""
+    """Copy the batches' impulses to their contacts, and compute twists from them and the free twists."""
     _, _, begin, end = part
     for i in range(begin, end):
         b = many.islands.bodies[i]
@@ -120,14 +120,14 @@ def _gather_impulses(many):
 
 @inlined
 def _save_impulses(many):
-    """Remember the impulses as the best met."""
+    """Save the present impulses as the best so far."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(g, of.PROX_BEST, of.batch_vector(g, of.PROX_IMPULSE, many), many)
 
 
 @inlined
 def _accept_trial(part, many):
-    """Take the impulses of the last `compute_defect`, as the law allows them, and the twists that belong to them."""
+    """Take the impulses of the last `compute_defect`, projected by the law, and the twists that they cause."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(
             g,
@@ -140,7 +140,7 @@ def _accept_trial(part, many):
 
 @inlined
 def _restore_impulses(part, many):
-    """Back to the best impulses met."""
+    """Restore the best impulses so far."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(g, of.PROX_IMPULSE, of.batch_vector(g, of.PROX_BEST, many), many)
     _apply_impulses(part, many)
@@ -172,10 +172,10 @@ def _heaviest(part, many):
 
 @kernel
 def prepare_system(part, sweeps, worth, fewest, many):
-    """Order the bodies for the linear system: the iterations with it that an island is worth, 0 where it is too dear.
+    """Order the bodies for the linear system; return the iterations that an island is worth, 0 if it costs too much.
 
-    A problem that may take so many sweeps is worth `worth` times their work, and dear where that is fewer than `fewest`
-    iterations: this is known before much work went into it.
+    A problem with so many sweeps allowed is worth `worth` times their work. It costs too much if that pays for fewer
+    than `fewest` iterations. This is known before much work is done.
     """
     first, last, begin, end = part
     contacts, worth = (last - first) * _CONTACT_COST, worth * sweeps * (last - first) * _SWEEP_COST
@@ -187,7 +187,7 @@ def prepare_system(part, sweeps, worth, fewest, many):
 
 @inlined
 def save_best(part, many):
-    """Remember the impulses as they are as the best of all methods."""
+    """Save the present impulses as the best of all methods."""
     for i in range(part[0], part[1]):
         put_vector(
             many.contacts.best_impulse,
@@ -199,7 +199,7 @@ def save_best(part, many):
 
 @inlined
 def restore_best(part, many):
-    """The best impulses of all methods, and the twists that belong to them."""
+    """Restore the best impulses of all methods, and the twists that they cause."""
     for i in range(part[2], part[3]):
         for c in range(TWIST_DOFS):
             many.bodies.twist[many.islands.bodies[i], c] = many.bodies.free_twist[many.islands.bodies[i], c]
@@ -211,7 +211,7 @@ def restore_best(part, many):
 
 @inlined
 def is_every_contact_pushing(part, many):
-    """True if all contacts of an island push: else not all of them will hold."""
+    """True if all contacts of an island push; else they cannot all stick."""
     for i in range(part[0], part[1]):
         if not many.contacts.impulse[many.islands.contacts[i], 0] > 0.0:
             return False
@@ -220,10 +220,10 @@ def is_every_contact_pushing(part, many):
 
 @kernel
 def try_all_sticking(part, friction, residual, enough, many):
-    """Impulses as if every contact held, if that makes the residual smaller, down to `enough`; the residual then [m/s].
+    """Try impulses with every contact sticking, and keep them if the residual falls; return it, `enough` at best [m/s].
 
-    The law being linear, its matrix is factored once, and a few rounds of q = p(x) cost little more than one: what
-    stands still is solved so far below the goal that the steps to come find nothing to do.
+    The law is then linear, so its matrix is factored once, and a few rounds of q = p(x) cost little more than one. A
+    resting stack is solved so far below the goal that the next steps find nothing to do.
     """
     first, last, begin, end = part
     rho = _STICK_RHO * _heaviest(part, many)

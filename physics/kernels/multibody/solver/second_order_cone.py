@@ -1,4 +1,4 @@
-"""Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, of one contact or of four at once, for `interior_point`.
+"""Lorentz cone x₀ ≥ |(x₁, x₂)| and its scaling, for one contact or four at once, in `interior_point`.
 
 With the product a ∘ b = (a·b, a₀ b' + b₀ a') the cone is that of squares. The scaling of Nesterov and Todd is the
 symmetric W with W p = W⁻¹ u = λ: for the unit vector w = (ū + R p̄)/(2γ), R = diag(1, -1, -1), and η⁴ = det u/det p
@@ -21,7 +21,7 @@ from physics.kernels.math import quaternion as qt
 
 @inlined
 def cone_determinant(a):
-    """a₀² - |a'|², as a product that does not cancel for a' of one component."""
+    """Determinant a₀² - |a'|², as a product without cancellation for a' of one component."""
     size = lane_sqrt(a[1] * a[1] + a[2] * a[2])
     return (a[0] - size) * (a[0] + size)
 
@@ -39,7 +39,7 @@ def nt_scaling(p, u):
 
 @inlined
 def apply_scaling(w, x):
-    """W x."""
+    """Product W x."""
     d = w[1] * x[1] + w[2] * x[2]
     f = x[0] + d / (1.0 + w[0])
     return (w[3] * (w[0] * x[0] + d), w[3] * (x[1] + f * w[1]), w[3] * (x[2] + f * w[2]))
@@ -47,13 +47,13 @@ def apply_scaling(w, x):
 
 @inlined
 def apply_inv_scaling(w, x):
-    """W⁻¹ x."""
+    """Product W⁻¹ x."""
     return apply_scaling((w[0], -w[1], -w[2], 1.0 / w[3]), x)
 
 
 @inlined
 def apply_inv_scaling_twice(w, x):
-    """W⁻² x."""
+    """Product W⁻² x."""
     s = 1.0 / (w[3] * w[3])
     d = 2.0 * (w[0] * x[0] - w[1] * x[1] - w[2] * x[2])
     return (s * (d * w[0] - x[0]), s * (x[1] - d * w[1]), s * (x[2] - d * w[2]))
@@ -61,13 +61,13 @@ def apply_inv_scaling_twice(w, x):
 
 @inlined
 def jordan_product(a, b):
-    """a ∘ b."""
+    """Jordan product a ∘ b."""
     return (qt.dot(a, b), a[0] * b[1] + b[0] * a[1], a[0] * b[2] + b[0] * a[2])
 
 
 @inlined
 def jordan_quotient(b, a, inverse):
-    """x with a ∘ x = b, `inverse` being 1/√det a."""
+    """Solution x of a ∘ x = b, with `inverse` 1/√det a."""
     x = (a[0] * b[0] - a[1] * b[1] - a[2] * b[2]) * (inverse * inverse)
     s = 1.0 / a[0]
     return (x, s * (b[1] - x * a[1]), s * (b[2] - x * a[2]))
@@ -75,7 +75,7 @@ def jordan_quotient(b, a, inverse):
 
 @inlined
 def inv_step_to_boundary(a, inverse, d):
-    """1/t for the largest t for which a + t d is in the cone, a being inside; at most 0: any.
+    """1/t for the largest t with a + t d in the cone, for a inside; at most 0 if any t is allowed.
 
     The scaling with a/√det a takes a to √det a e and d to h √det a: 1 + t h₀ ≥ t |h'| is required.
     """

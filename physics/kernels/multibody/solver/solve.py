@@ -1,4 +1,4 @@
-"""The contact problem of all bodies of a world at once: which method solves it, and what it says of it.
+"""Solve the contact problem of all bodies of a world at once, by a choice of methods, and report it.
 
 A warm start that still solves the problem costs one look at the residual. Else the contacts fall into islands
 (`islands`), and each that is not solved yet takes, in this order, as far as it is needed:
@@ -105,7 +105,7 @@ NEWTON_RHO = (10.0, 1.0, 1.0)
 
 @inlined
 def save_free_twists(many):
-    """Save the twists as they are, without any impulse (`many.bodies.free_twist`)."""
+    """Save the present twists, without any impulse (`many.bodies.free_twist`)."""
     for b in range(many.bodies.twist.shape[0]):
         for c in range(TWIST_DOFS):
             many.bodies.free_twist[b, c] = many.bodies.twist[b, c]
@@ -113,14 +113,14 @@ def save_free_twists(many):
 
 @inlined
 def reset_body_to_free(b, many):
-    """The twist of body b without any impulse."""
+    """Reset the twist of body b to that without any impulse."""
     for c in range(TWIST_DOFS):
         many.bodies.twist[b, c] = many.bodies.free_twist[b, c]
 
 
 @inlined
 def clear_island_impulses(part, many):
-    """No impulses in an island."""
+    """Clear the impulses of an island."""
     for i in range(part[0], part[1]):
         put_vector(many.contacts.impulse, many.islands.contacts[i], 0, (0.0, 0.0, 0.0))
     for i in range(part[2], part[3]):
@@ -129,7 +129,7 @@ def clear_island_impulses(part, many):
 
 @inlined
 def clear_all_impulses(n, many):
-    """No impulses at all."""
+    """Clear all impulses."""
     for k in range(n):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
     for b in range(many.bodies.twist.shape[0]):
@@ -138,7 +138,7 @@ def clear_all_impulses(n, many):
 
 @kernel
 def alternate_second_order(part, friction, scale, residual, goal, limit, many):
-    """Interior point and Newton's method in turns: (iterations, residual)."""
+    """Alternate interior point and Newton's method: (iterations, residual)."""
     count, best, start, last = 0, residual, residual, len(NEWTON_RHO) - 1
     save_best(part, many)
     for turn in range(last + 1):
@@ -165,7 +165,7 @@ def alternate_second_order(part, friction, scale, residual, goal, limit, many):
 
 @kernel
 def sweep_as_fallback(part, friction, residual, goal, limit, many):
-    """Sweeps from the best impulses met, which stay where those do not lead to better ones: (sweeps, residual)."""
+    """Sweep from the best impulses so far, and keep the better ones: (sweeps, residual)."""
     save_best(part, many)
     count, now = sweep_contacts(part[0], part[1], friction, residual, goal, limit, many)
     if not now < residual:
@@ -176,7 +176,7 @@ def sweep_as_fallback(part, friction, residual, goal, limit, many):
 
 @inlined
 def is_island_inactive(part, goal, many):
-    """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without that."""
+    """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without impulses."""
     for i in range(part[0], part[1]):
         k = many.islands.contacts[i]
         if many.contacts.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
@@ -186,9 +186,9 @@ def is_island_inactive(part, goal, many):
 
 @inlined
 def _is_swept_first(part, goal, scale, many):
-    """True if sweeps try an island first: it has one contact, or an impact at a coarse tolerance.
+    """True if an island is first solved by sweeps: it has one contact, or an impact at a coarse tolerance.
 
-    An impact begins from no impulses, and asks something of the few contacts near it.
+    An impact starts without impulses, and involves only the few contacts near it.
     """
     is_impact = many.settings[0].is_resting_stage == 0
     return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
@@ -198,7 +198,7 @@ def _is_swept_first(part, goal, scale, many):
 def solve_island(part, friction, scale, residual, goal, deep, many):
     """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method).
 
-    What holds is solved to `deep` [m/s].
+    Islands of sticking contacts are solved to `deep` [m/s].
     """
     first, last, _, _ = part
     limit, count = many.settings[0].sweeps, 0
@@ -237,7 +237,7 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
 
 @inlined
 def max_impulse_speed(first, last, many):
-    """Largest speed that a contact's impulse alone would give [m/s]."""
+    """Largest speed that a contact's impulse alone would cause [m/s]."""
     most = 0.0
     for i in range(first, last):
         k = many.islands.contacts[i]
@@ -248,7 +248,7 @@ def max_impulse_speed(first, last, many):
 
 @inlined
 def max_body_speed(many):
-    """No point of a body that something is near is faster than this [m/s]."""
+    """Bound of the speed of any point of the bodies with neighbours [m/s]."""
     most = 0.0
     for b in range(many.bodies.twist.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -259,9 +259,9 @@ def max_body_speed(many):
 
 @kernel
 def solve_island_frictionless(part, friction, goal, many):
-    """Impulses along the normals only, from none: the residual, which is that of the problem with friction [m/s].
+    """Solve for impulses along the normals only, from none; return the residual of the problem with friction [m/s].
 
-    The last resort, where the methods for friction went astray: these sweeps never raise the energy.
+    This is the last resort, after the methods for friction have failed: these sweeps never raise the energy.
     """
     first, last, _, _ = part
     clear_island_impulses(part, many)
@@ -271,7 +271,7 @@ def solve_island_frictionless(part, friction, goal, many):
 
 @shared_kernel
 def solve_all_frictionless(n, many):
-    """`solve_island_frictionless` of all n contacts, after a solve with friction failed: the residual [m/s]."""
+    """Do `solve_island_frictionless` for all contacts, when friction found no solution; return the residual [m/s]."""
     save_free_twists(many)
     clear_all_impulses(n, many)
     goal = many.settings[0].tolerance * assemble_contact_blocks(n, many)
@@ -282,11 +282,11 @@ def solve_all_frictionless(n, many):
 def solve_contacts(n, friction, many):
     """Solve for `many.contacts.impulse` from the warm start in it: (iterations, relative residual, method).
 
-    `many.bodies.twist` holds the velocities without any contact impulse and receives those with them. The residual is
-    measured on what is returned, relative to the largest velocity that a contact would have without any impulse; or,
-    where all of those are next to rounding, to that speed of which the rounding of velocities or of impulses is the
-    tolerance's share; or, in a part of a substep, to what loads give in half of it (`adaptive_substep`).
-    Iterations are those of the island that took most.
+    `many.bodies.twist` holds the velocities without contact impulses, and receives those with them. The residual is
+    measured on the returned impulses, relative to a speed. This speed is the largest velocity that a contact would have
+    without impulses. If all of those are close to rounding, it is the speed at which the tolerance equals the rounding
+    of velocities or impulses. In a part of a substep it is the speed that loads give in half of it
+    (`adaptive_substep`). Iterations are the largest number of any island.
     """
     save_free_twists(many)
     tolerance = many.settings[0].tolerance

@@ -1,4 +1,4 @@
-"""Error control of a substep: parts as long as they agree with two of half their length.
+"""Error control of a substep: it is cut into parts that agree with two of half their length.
 
 Impacts are met in time by a part of any length (`impact`). What is not, and makes an error of first or second order in
 the part where it happens: contacts that open, begin to slip or hold; slow meetings; and contacts whose problem has
@@ -45,7 +45,7 @@ SNAPSHOT_START, SNAPSHOT_COARSE, SNAPSHOT_MIDDLE = range(3)
 
 @inlined
 def _save_snapshot(slot, world, kept, memory, report, many, counts):
-    """Keep the world as it is now."""
+    """Save the present state of the world."""
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
             kept.state[slot, b, c] = many.bodies.state[b, c]
@@ -59,9 +59,9 @@ def _save_snapshot(slot, world, kept, memory, report, many, counts):
 
 @inlined
 def _restore_snapshot(slot, world, kept, memory, report, many, counts):
-    """Make the world what it was when it was kept, but for the work that the report counts.
+    """Restore the saved state of the world, except the work counted by the report.
 
-    Events logged since are no more: their rows are written over.
+    Events logged since then are dropped: their rows are overwritten.
     """
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
@@ -84,7 +84,7 @@ def _length(a):
 def _body_error(b, offset_frame, kept, many):
     """Distance of body b from its state `SNAPSHOT_COARSE`, in its radius; and the difference in velocity, in its speed.
 
-    Of its speed counts no less than what its loads give it over its radius.
+    The speed counts as at least the speed that the body's loads give it over its radius.
     """
     body = many.bodies.work[b]
     x, q, v, L = read_state(many.bodies.state, b)
@@ -104,7 +104,7 @@ def _body_error(b, offset_frame, kept, many):
 
 @inlined
 def _max_body_error(offset_frame, kept, many):
-    """Largest error of any body, 1: all that is allowed."""
+    """Largest error of any body, as a multiple of the allowed one."""
     worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
     for b in range(many.bodies.state.shape[0]):
         found = _body_error(b, offset_frame, kept, many) / allowed
@@ -115,7 +115,7 @@ def _max_body_error(offset_frame, kept, many):
 
 @kernel
 def _step_part(world, start, h, switches, records, many):
-    """One part of h [s], `start` [s] after the call."""
+    """Take one part of h [s], `start` [s] after the call."""
     for b in range(many.bodies.state.shape[0]):
         set_clock(start, many.bodies.work[b])
         many.bodies.touched[b] = 0
@@ -124,7 +124,7 @@ def _step_part(world, start, h, switches, records, many):
 
 @kernel
 def _step_with_halving(world, start, unit, part, shortest, switches, kept, records, many):
-    """Advance by `part` units of time [s], or by half of it, or a quarter ...: (units taken, error, lengths tried)."""
+    """Advance by `part` units of time [s], or a half, a quarter ... of it: (units taken, error, lengths tried)."""
     offset_frame, tried = switches.flight.offset_frame, 1
     _save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
     _step_part(world, start, part * unit, switches, records, many)
@@ -147,10 +147,10 @@ def _step_with_halving(world, start, unit, part, shortest, switches, kept, recor
 
 @inlined
 def _min_load_speed(h, many):
-    """Speed that its loads give the body that they give the least, in h [m/s].
+    """Least speed that a body gains by its loads in h [m/s].
 
-    A part is solved no finer than the halves in which every substep is stepped at least. Its share of that would be
-    less than rounding leaves where bodies turn on edges, and no error is as small.
+    The solves of a part are at least as coarse as those of the halves in which every substep is taken. A finer goal
+    would be below the rounding of bodies that turn on edges, and no error is as small.
     """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
@@ -162,8 +162,8 @@ def _min_load_speed(h, many):
 def step_with_error_control(world, start, h, switches, kept, records, many):
     """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
 
-    Where the shortest part does not meet it either, that is counted as a fallback, and the shortest part of this
-    substep is longer from there on.
+    If the shortest part does not meet the error either, it counts as a fallback, and the shortest part is longer for
+    the rest of this substep.
 
     `switches` are `MultibodySwitches`; `kept` is what `allocation.make_snapshots` makes.
     """

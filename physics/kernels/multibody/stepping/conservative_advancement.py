@@ -1,4 +1,4 @@
-"""Bodies that turn far in a stage: how long they are sure to stay clear of walls and of each other in free flight.
+"""Safe times of free flight for bodies that turn far in a stage, near walls and each other.
 
 `physics.kernels.half_space.conservative_advancement` for many bodies: along a direction n, out of b, a and b are apart
 after t by at least
@@ -53,10 +53,11 @@ _ARRIVAL_FRACTION = 0.5
 
 @inlined
 def write_spin_bounds(h, offset_frame, many):
-    """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; whether any may.
+    """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; return whether any may.
 
-    Most are told by a glance: loads turn a body by h times its acceleration over its radius at most, and while it turns
-    by less than `FAR_TURN` it gets no faster by a factor of √2 (see `conservative_advancement.spin_bound`).
+    A cheap test settles most bodies. Loads turn a body by at most h times its acceleration over its radius. While it
+    turns by less than `FAR_TURN`, its spin grows by less than a factor of √2 (see
+    `conservative_advancement.spin_bound`).
     """
     least, found = FAR_TURN, False
     if many.settings[0].is_error_controlled == 1:
@@ -76,7 +77,7 @@ def write_spin_bounds(h, offset_frame, many):
 
 @kernel
 def _write_spin_bound(b, h, least, offset_frame, many):
-    """Write `many.bodies.spin_bound` of one body: whether it turns far."""
+    """Write `many.bodies.spin_bound` of one body; return whether it turns far."""
     _, q, _, L = read_state(many.bodies.state, b)
     if not may_turn(L, h, least, offset_frame, many.bodies.work[b]):
         return False
@@ -89,7 +90,7 @@ def _write_spin_bound(b, h, least, offset_frame, many):
 
 @inlined
 def clear_spin_bounds(many):
-    """Let nothing turn far."""
+    """Clear all bounds: no body turns far."""
     for b in range(many.bodies.state.shape[0]):
         many.bodies.spin_bound[b] = 0.0
 
@@ -138,7 +139,7 @@ def _norm(m):
 
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
-    """Time within which the gap along n is not used up, at most `horizon` [s]."""
+    """Time within which the gap along n cannot close, at most `horizon` [s]."""
     rate, turning = one[3], many.bodies.work[a].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
@@ -171,7 +172,7 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 @inlined
 def _turning_acceleration(b, h, offset_frame, many):
-    """Bound of what turning accelerates a point of body b by within h [m/s²]."""
+    """Bound of the acceleration of a point of body b by turning within h [m/s²]."""
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
@@ -188,10 +189,10 @@ def _load_acceleration(b, n, many):
 
 @kernel
 def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
-    """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived or will not [s].
+    """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived, or will not [s].
 
-    Bodies in contact do not fly as is foretold here, nor do those that touch each other: they turn no further than a
-    look at the end can tell.
+    The free flight of the bound does not apply to bodies in contact, nor to a pair that touches. These turn at most as
+    far as a test at the end can judge.
     """
     touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
     one = read_state(many.bodies.state, a)
@@ -239,7 +240,7 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def safe_stage_length(h, gyroscopic, offset_frame, hulls, many):
-    """Time, at most h, that a stage may take: nothing that turns far passes through anything meanwhile [s]."""
+    """Time, at most h, that a stage may take so that no body that turns far passes through another [s]."""
     first = h
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.spin_bound[b] > 0.0:

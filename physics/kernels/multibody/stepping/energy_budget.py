@@ -1,4 +1,4 @@
-"""No more energy than there is, where bodies touch each other: resting stages, and places put right.
+"""Energy budget of resting stages and position corrections, where bodies touch each other.
 
 A contact's target that knows how the bodies turn (`midpoint_step.set_resting_targets`) is gainless where bodies answer
 alike in all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their
@@ -43,11 +43,11 @@ def save_loaded_momenta(b, many):
 
 @kernel
 def has_gained_energy(n, h, many):
-    """True if the impulses of a resting stage of n contacts raised the energy by more than solve and step may.
+    """True if the impulses of a resting stage of n contacts raised the energy beyond the errors of solve and step.
 
     Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
-    a residual r = tolerance · s, s the largest free speed, and so give ½ p r, which in a tower is far more than what
-    its bodies move with. To hold loads, none needs a p above all of them together, F: what is beyond is strain.
+    a residual r = tolerance · s, with the largest free speed s, and so give ½ p r. In a tower this is far more than the
+    energy of its bodies. No contact needs an impulse p above the sum F of all loads to hold them; the rest is strain.
     """
     gain = size = fastest = F = 0.0
     for b in range(many.bodies.state.shape[0]):
@@ -102,14 +102,14 @@ def revert_to_dissipative(n, offset_frame, many):
 
 @inlined
 def work_against_loads(b, x, many):
-    """Work that moving body b from x to where it is takes against its loads [J]."""
+    """Work against the loads of moving body b from x to its present place [J]."""
     body, y = many.bodies.work[b], row_vector(many.bodies.state, b, at.POS)
     return -body.mass * qt.dot(as_vector(body.free_acceleration), subtract(y, x))
 
 
 @kernel
 def cap_rotational_energy(b, before, offset_frame, many):
-    """Shorten the angular momentum of a body that was turned, if ½L·I⁻¹L would be more than before."""
+    """Shorten the angular momentum of a turned body if ½L·I⁻¹L would have grown."""
     _, q, _, L = read_state(many.bodies.state, b)
     after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
     if after > before + _FREE_ROTATION_SHARE * before:
@@ -119,7 +119,7 @@ def cap_rotational_energy(b, before, offset_frame, many):
 
 @kernel
 def take_kinetic_energy(b, price, offset_frame, many):
-    """Take a price [J] from the motion of body b, as far as there is any."""
+    """Take a price [J] from the motion of body b, at most all of it."""
     _, q, v, L = read_state(many.bodies.state, b)
     body = many.bodies.work[b]
     kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
@@ -130,7 +130,7 @@ def take_kinetic_energy(b, price, offset_frame, many):
 
 @inlined
 def free_lift_work(b, many):
-    """Lift of body b that costs nothing [J]."""
+    """Work of a lift of body b that costs nothing [J]."""
     body = many.bodies.work[b]
     return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 
@@ -139,8 +139,8 @@ def free_lift_work(b, many):
 def clamp_body_inside_walls(b, offset_frame, many):
     """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
 
-    Contacts hold points. Loads of a million times the weight may turn a body by many radians in a step, and points that
-    move with that say nothing about where the centre goes.
+    Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,
+    and its points then say nothing about the way of the centre.
     """
     body, was_outside = many.bodies.work[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])

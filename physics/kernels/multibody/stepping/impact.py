@@ -1,4 +1,4 @@
-"""Impacts: what contacts ask of velocities where bodies meet, and how long it takes until they next do."""
+"""Impacts: target velocities of contacts where bodies meet, and the time until the next meeting."""
 
 from __future__ import annotations
 
@@ -44,7 +44,8 @@ FORETOLD = -1.0e299
 def _rest_speed(k, many):
     """Speed that loads give contact k within `rest_share` of the substep [m/s].
 
-    Of all of it, however little is left after an impact of others: else those would make what rests bounce.
+    The whole substep counts, even if little of it is left after an impact of others; else such impacts would make
+    resting bodies bounce.
     """
     return many.settings[0].rest_share * relative_acceleration_bound(k, many) * many.settings[0].substep
 
@@ -58,9 +59,10 @@ def is_bouncing(k, many):
 
 @inlined
 def rest_speed_limit(k, h, many):
-    """Speed that the resting stage may stop [m/s].
+    """Largest speed that the resting stage may stop [m/s].
 
-    What loads give within `rest_share` of the substep, or what goes in by a few slops only until the middle of h.
+    The limit is the speed that loads give within `rest_share` of the substep, or one that closes a few slops until the
+    middle of h.
     """
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     return max(2.0 * _SOFT_LANDING_SLOPS * slop / h, _rest_speed(k, many))
@@ -68,10 +70,10 @@ def rest_speed_limit(k, h, many):
 
 @inlined
 def impact_speed_limit(k, h, many):
-    """Speed that is to be met in time: one that closes `_FAST_RADIUS_SHARE` of the smaller radius within h [m/s].
+    """Least speed of contacts to be met in time [m/s]: it closes `_FAST_RADIUS_SHARE` of the smaller radius within h.
 
-    Under error control (`adaptive_substep`) all that is not slow, so that no part has to be as short as the error of
-    where bodies meet.
+    Under error control (`adaptive_substep`) every contact that is not slow is met in time. Else parts would be as short
+    as the error in the place of a meeting.
     """
     one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     radius = many.bodies.work[one].radius
@@ -85,7 +87,7 @@ def impact_speed_limit(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """True if contact k, or one after it in the set by steps of `step`, touches and is of the same pair."""
+    """True if contact k, or one after it in the set by steps of `step`, touches and belongs to the same pair."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     least = arrival_gap(a, b, many)
     while 0 <= k < many.counts[NUM_CONTACTS] and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
@@ -97,9 +99,9 @@ def _pair_touches(k, step, many):
 
 @inlined
 def is_left_to_advancement(k, many):
-    """True where `conservative_advancement` finds the time of contact k: a body that turns far leaves its tangent.
+    """True if `conservative_advancement` finds the time of contact k, because a body turns far.
 
-    It looks at what is apart: where the pair touches elsewhere the contact is foretold as any other.
+    It serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)):
@@ -118,9 +120,10 @@ def is_impact_ahead(k, h, many):
 
 @inlined
 def _impact_target(k, h, many):
-    """Target of contact k that takes part in an impact, and whether it is hit: others may leave it as it is.
+    """Target of contact k in an impact, and whether it collides: others may leave it unchanged.
 
-    What leaves may be turned round to e times its speed, Moreau's law: without it a struck chain could gain energy.
+    A leaving contact may be reversed to e times its speed, as in Moreau's law; without this a struck chain could gain
+    energy.
     """
     speed = many.contacts.speed[k]
     if speed > 0.0 or is_bouncing(k, many):
@@ -130,7 +133,7 @@ def _impact_target(k, h, many):
 
 @inlined
 def _distant_target(k, h, is_last, many):
-    """Target of contact k that is apart, and whether it has to be braked in the air; not constrained if met in time."""
+    """Target of contact k with a gap, and whether it must be braked in the air; unconstrained if met in time."""
     goal = -(many.contacts.gap[k] + parted_slack(k, many)) / h
     if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):
         return -_UNCONSTRAINED, False
@@ -139,7 +142,7 @@ def _distant_target(k, h, is_last, many):
 
 @inlined
 def _is_in_same_moment(k, many):
-    """True if contact k, which is apart, is so near that it belongs to an impact of others.
+    """True if contact k has a gap so small that it belongs to an impact of others.
 
     That is within two slops, or, of a pair that touches elsewhere, within what the tolerance makes of the way in the
     substep, or of some radii: the corners of one face would else hit one after another, each turning the body that the
@@ -157,12 +160,12 @@ def _is_in_same_moment(k, many):
 
 @inlined
 def set_impact_targets(n, h, is_last, many):
-    """Targets of an impact, and the contact that approaches fastest of those that make it one, -1: there is none.
+    """Set the targets of an impact; return the fastest approaching contact of those that cause it, -1 without one.
 
     See `physics.kernels.contact_law.target_velocity.set_impact_targets`.
 
-    What approaches no faster than loads make it within `rest_share` of the step, or would go in by a few slops only
-    until the middle of it, is left to the resting stage, unless it is fast.
+    A contact is left to the resting stage, unless it is fast, in two cases: its speed is at most the one that loads
+    give within `rest_share` of the step, or it would close only a few slops until the middle of the step.
     """
     fastest, is_impact = -1, False
     for k in range(n):
@@ -180,7 +183,7 @@ def set_impact_targets(n, h, is_last, many):
 
 @kernel
 def _extend_impact(n, h, fastest, many):
-    """Let an impact take in what belongs to the same moment; the contact that approaches fastest then."""
+    """Add the contacts of the same moment to an impact; return the new fastest approaching contact."""
     for k in range(n):
         slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
         if many.contacts.gap[k] > slop and _is_in_same_moment(k, many):
@@ -192,7 +195,7 @@ def _extend_impact(n, h, fastest, many):
 
 @inlined
 def drop_unconstrained(n, many):
-    """Drop the contacts that have no target from the set: they are not met in this stage. Returns what is left."""
+    """Drop contacts without a target from the set, since they are not met in this stage; return the rest."""
     left = 0
     for k in range(n):
         if many.contacts.target[k, 0] > -_UNCONSTRAINED:
@@ -211,9 +214,9 @@ def _mark_bodies(k, many):
 
 @inlined
 def constrain_coupled_contacts(n, many):
-    """Keep those without a target whose bodies are in other contacts of the set, or in some that are kept for this.
+    """Keep contacts without a target if their bodies are in other contacts of the set, or in contacts kept for this.
 
-    Loads alone do not bring them together in this stage, but what pushes these bodies may.
+    Loads alone do not close these contacts in this stage, but pushes on their bodies may.
     """
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
@@ -234,11 +237,11 @@ def constrain_coupled_contacts(n, many):
 
 @kernel
 def resolve_impacts(n, world, t, h, is_last, switches, records, many):
-    """Velocities after the impulses of the contacts that approach; nothing where none does. Contacts in the set.
+    """Velocities after the impulses of approaching contacts, unchanged without one; return the contacts in the set.
 
     It happens t [s] after the start of the call, with h [s] left of the substep.
 
-    In turn only the one that approaches fastest gives an impulse: the step comes back for the others.
+    With impacts in turn only the fastest approaching contact gives an impulse: the step comes back for the others.
     """
     fastest = set_impact_targets(n, h, is_last, many)
     meeting = time_to_first_impact(n, h, is_last, many)
@@ -258,11 +261,10 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
 
 @inlined
 def time_to_first_impact(n, h, is_last, many):
-    """Time until the first of the meetings that matter, at the latest h [s]: never too late.
+    """Time until the first meeting that matters, at most h [s]; never too late.
 
-    Two points approach by at most s t + a t²/2 with a the bound of their acceleration by loads and turning, so
-    that the gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). What turns far is looked at by
-    `conservative_advancement`.
+    Two points approach by at most s t + a t²/2, with a bound a of their acceleration by loads and turning. So the gap
+    lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). `conservative_advancement` serves bodies that turn far.
     """
     first = h
     if is_last:

@@ -1,4 +1,4 @@
-"""Impacts told as events: one for each pair of bodies, or body and wall, that an impulse has passed between."""
+"""Log impacts as events: one for each pair of bodies, or body and wall, with an impulse between them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.kernels.time_stepping import event_log as ev
 
 @kernel
 def log_impacts(n, world, t, many, log, counts):
-    """Log the impulses of the n contacts of an impact, which are posed where the bodies are, at the time t [s].
+    """Log the impulses of the n contacts of an impact, set up at the bodies' places, at the time t [s].
 
     Contacts of one pair follow each other in the set (`dispatch.find_contacts`). The impulse is that on the first body
     of the pair, whose events these are, and acts at points of it.

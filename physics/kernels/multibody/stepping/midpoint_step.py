@@ -1,4 +1,4 @@
-"""The stage between impacts: exact flight of what touches nothing, Moreau's midpoint step of what does."""
+"""Stage between impacts: exact flight of bodies without contact, Moreau's midpoint step of others."""
 
 from __future__ import annotations
 
@@ -64,7 +64,8 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 def _centripetal(b, k, first, side, h, many):
     """ω x ṙ of one end of contact k, world frame [m/s²].
 
-    0 of a sphere, whose point of contact does not turn, and where it says nothing about the end of a stage of length h.
+    It is 0 for a sphere, whose contact point does not turn, and where a body turns too far for it to describe the end
+    of a stage of length h.
     """
     shape, w = many.bodies.work[b].shape, row_vector(many.bodies.twist, b, 3)
     if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
@@ -79,9 +80,9 @@ def _centripetal(b, k, first, side, h, many):
 
 @inlined
 def _coriolis(k, many):
-    """Half of what the normal's turning gives to the relative velocity along it, [m/s²]: n·(ω x u).
+    """Half of the change, by the normal's turning, of the relative velocity along it [m/s²]: n·(ω x u).
 
-    A point that slides at u on a face that turns at ω meets it where another normal was: the gap's second derivative
+    A point that slides at u on a face, which turns at ω, meets other normals on its way. So the gap's second derivative
     has 2 n·(u x ω) beside the accelerations of the points.
     """
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
@@ -92,11 +93,11 @@ def _coriolis(k, many):
 
 @inlined
 def set_resting_targets(n, h, many):
-    """Targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
+    """Set the targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
 
-    A contact that was apart at the start may close what is left of its gap at the middle in the half that follows.
-    Under error control, what a point on a circle has risen by then is no gap: it would make the velocity an
-    error of first order.
+    A contact with a gap at the start may close the rest of it, measured at the middle, in the second half. Under error
+    control the rise of a point on a circle until then does not count as a gap: it would make the velocity an error of
+    first order.
     """
     half = 0.5 * h
     for k in range(n):
@@ -139,7 +140,7 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
 
 @inlined
 def rest_residual(h, many):
-    """Residual that the stage is solved to whatever the tolerance allows; see `midpoint_step.rest_residual`."""
+    """Largest residual of the stage, whatever the tolerance allows; see `midpoint_step.rest_residual`."""
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
         slop_speed = many.bodies.work[b].slop / h
@@ -153,7 +154,7 @@ def rest_residual(h, many):
 
 @inlined
 def max_load_speed(h, many):
-    """Speed that the loads of the stage alone give to what touches, at most [m/s]."""
+    """Largest speed that the loads of the stage alone give to touching bodies [m/s]."""
     most = 0.0
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -163,7 +164,7 @@ def max_load_speed(h, many):
 
 @inlined
 def step_under_held_loads(n, world, h, switches, sleep, records, many):
-    """`midpoint_step` under the loads that are held."""
+    """Take a `midpoint_step` under the held loads."""
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep):
@@ -218,7 +219,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
 
 @kernel
 def midpoint_step(n, world, h, switches, sleep, records, many):
-    """Every body after h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+    """Advance every body by h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
     note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.work[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)

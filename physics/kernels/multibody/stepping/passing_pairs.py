@@ -1,4 +1,4 @@
-"""Pairs of bodies that pass each other within a stage: a contact between them acts along a plane that parts them.
+"""Pairs of bodies that pass each other within a stage: their contact acts along a plane that parts them.
 
 A contact of two bodies that are apart keeps its direction through the stage, which is that between their nearest
 points now. To a body that slides past an edge this direction is a wall across its way. Motion decides instead: where
@@ -55,13 +55,13 @@ _MAX_THINNING_SHARE = 0.5
 
 @inlined
 def _depth_after(k, h, many):
-    """Depth of contact k after h at its speed now [m]."""
+    """Depth of contact k after h at its present speed [m]."""
     return -many.contacts.gap[k] - h * many.contacts.speed[k]
 
 
 @inlined
 def _smallest_half_width(b, many):
-    """Smallest half-width of body b [m], of a hull that of the block that reaches as far."""
+    """Smallest half-width of body b [m]; of a hull that of the block with its `dimensions`."""
     d = many.bodies.work[b].dims
     if many.bodies.work[b].shape == SPHERE:
         return d[0]
@@ -88,7 +88,7 @@ def _thinning(a, b, n, h, many):
 
 @inlined
 def _moves_as_foreseen(a, b, gap, n, h, many):
-    """True if nothing else is near bodies a and b, and their loads do not close the gap between them within h."""
+    """True if nothing else is near bodies a and b, and their loads do not close their gap within h."""
     for k in range(n):
         c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
         if (c != a or d != b) and (c in (a, b) or d in (a, b)):
@@ -118,7 +118,7 @@ def _end_pose(b, h, gyroscopic, offset_frame, many):
 
 @kernel
 def _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many):
-    """Direction out of b that parts the two all through h, and whether there is one; `way` is a first guess."""
+    """Direction out of b that parts the two throughout h, and whether there is one; `way` is a first guess."""
     now = (
         (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
         (row_vector(many.bodies.center, b, 0), row_matrix(many.bodies.rotation, b)),
@@ -131,7 +131,7 @@ def _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, m
 
 @kernel
 def _gap_along(a, b, n, hulls, many):
-    """Gap between two bodies along n, and their points that are nearest along it [m]."""
+    """Gap between two bodies along n, and their nearest points along it [m]."""
     x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
     p = support_point(a, x, row_matrix(many.bodies.rotation, a), (-n[0], -n[1], -n[2]), 0.0, hulls, many)
     q = support_point(b, y, row_matrix(many.bodies.rotation, b), n, 0.0, hulls, many)
@@ -140,7 +140,7 @@ def _gap_along(a, b, n, hulls, many):
 
 @inlined
 def _end_of_pair(k, n, many):
-    """First contact after k, of the n in the set, that is of another pair."""
+    """First contact after k, of the n in the set, of another pair."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
         k += 1
@@ -149,7 +149,7 @@ def _end_of_pair(k, n, many):
 
 @inlined
 def _fastest_stopping(first, last, h, many):
-    """Contact of a pair's that would stop it, the fastest, or -1: none would, or advancement sees to the pair."""
+    """Fastest contact of a pair that would stop it; -1 without one, or if `conservative_advancement` serves it."""
     a, b, found = many.contacts.bodies[first, 0], many.contacts.bodies[first, 1], -1
     if b < 0 or many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0:
         return found
@@ -182,11 +182,11 @@ def _mark_passing(n, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
-    """Write the contact that takes the place of those of a pair that passes at `to`; k is its fastest, of n in the set.
+    """Replace the contacts of a passing pair by one, at `to`; k is its fastest contact, of n in the set.
 
-    Returns whether it passes, and the contacts of the set from then on. A contact that lands along its own direction
-    stays. So does that of bodies that touch along the plane between them, unless it goes deeper than they are thinned
-    by along any direction. Bodies that nothing else can push have no contact.
+    Returns whether the pair passes, and the new number of contacts. A contact that lands along its own direction stays.
+    So does a contact of bodies that touch along the plane between them, unless it is deeper than their thinning along
+    any direction. Bodies that nothing else can push have no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     thinner = _thinning(a, b, n, h, many)

@@ -1,4 +1,4 @@
-"""Push overlapping bodies apart: positions only; velocities change where that would gain energy (`energy_budget`).
+"""Push overlapping bodies apart: positions only; velocities change if energy would grow (`energy_budget`).
 
 The displacements of the bodies solve the frictionless contact problem whose targets are depths instead of velocities:
 the least displacement, in the metric of mass, that brings every contact of the set back to half a slop. A quarter of
@@ -54,7 +54,7 @@ _DEEP_SWEEPS = 1000
 def _set_displacement_targets(n, many):
     """Set the target displacements along the normals: (deepest penetration, negligible error of a displacement [m]).
 
-    The penetration is in slops of its pair: from 1 on there are some displacements.
+    The penetration is in slops of its pair; displacements begin at 1.
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
@@ -106,16 +106,16 @@ def _spin(b, many):
 
 @inlined
 def _share_that_takes(energy, stock):
-    """Share s of a relative velocity to take so that its energy `stock` is less by `energy`: stock (1 - (1 - s)²)."""
+    """Share s of a relative velocity with the energy `stock` to take for an `energy`: stock (1 - (1 - s)²)."""
     return 1.0 - math.sqrt(max(0.0, 1.0 - energy / stock)) if stock > 0.0 else 0.0
 
 
 @kernel
 def _take_relative_energy(a, b, energy, many):
-    """Take energy [J] from the relative motion of two bodies, both momenta kept: whether there was as much.
+    """Take energy [J] from the relative motion of two bodies, with both momenta kept; return whether it sufficed.
 
-    First from their velocity along the line of centres, then from the difference of their spins, with an inertia no
-    larger than any of theirs. Nothing is taken where both have less.
+    The energy comes first from the velocity along the line of centres, then from the difference of their spins, with
+    the least of their moments of inertia. Nothing is taken if both have less.
     """
     inverse = many.bodies.inv_mass[a] + many.bodies.inv_mass[b]
     way = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
@@ -139,10 +139,10 @@ def _take_relative_energy(a, b, energy, many):
 
 @kernel
 def _keep_angular_momentum(n, many):
-    """Turn the bodies of each contact against the angular momentum of their centres that pushing them apart adds.
+    """Turn the bodies of each contact, to keep the angular momentum that pushing their centres apart would add.
 
-    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both take up a part by their m r²: the same angular
-    velocity, as if they were one body. The energy that this adds is noted in `many.contacts.rebound_impulse`.
+    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both bodies take up a part by their m r²: they get
+    the same angular velocity, as if they were one. `many.contacts.rebound_impulse` stores the added energy.
     """
     for k in range(n):
         a, b, p = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.impulse[k, 0]
@@ -171,7 +171,8 @@ def _spin_energy(b, many):
 def _pay_for_spins(n, offset_frame, many):
     """Take the energy that `_keep_angular_momentum` has added from the relative motion of the bodies.
 
-    What is more than they have, and more than next to nothing, comes from their spins, and momentum with it.
+    An energy beyond that of the relative motion, and beyond a negligible one, is taken from the bodies' spins, which
+    changes their momentum.
     """
     for k in range(n):
         a, b, gain = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.rebound_impulse[k, 0]
@@ -185,7 +186,7 @@ def _pay_for_spins(n, offset_frame, many):
 
 @inlined
 def _displace(b, offset_frame, many):
-    """Move and turn body b by what `many.bodies.twist` says; the work that it takes against its loads [J]."""
+    """Move and turn body b by `many.bodies.twist`; return the work against its loads [J]."""
     x, q, v, L = read_state(many.bodies.state, b)
     start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
@@ -199,7 +200,7 @@ def _displace(b, offset_frame, many):
 
 @inlined
 def _displace_all(offset_frame, many):
-    """Move and turn the bodies, and let those that were lifted pay for what all of them were (`energy_budget`)."""
+    """Move and turn the bodies, and let the lifted ones pay for the lift of all (`energy_budget`)."""
     total = ups = free = 0.0
     for b in range(many.bodies.state.shape[0]):
         many.bodies.lift_work[b] = 0.0
@@ -219,7 +220,7 @@ def _displace_all(offset_frame, many):
 
 @inlined
 def _correct_once(n, offset_frame, many):
-    """One round for the n contacts, posed where the bodies are: the deepest that anything was, in its slop."""
+    """Do one round for the n contacts, set up at the bodies' places; return the greatest depth, in slops."""
     update_contacts(many)
     deepest, error = _set_displacement_targets(n, many)
     if not deepest > 1.0:

@@ -1,4 +1,4 @@
-"""The displacements that push bodies apart: sweeps along the normals over what an overlap comes to.
+"""Displacements that push bodies apart: sweeps along the normals over contacts that overlap.
 
 Most contacts of a set never move: they begin as they are asked to be, and no body of theirs is pushed. So a contact is
 assembled where it is visited first, and once no sweep comes to a new body only the contacts of bodies that were pushed
@@ -24,7 +24,7 @@ _NOT_ASSEMBLED = 0.0
 
 @inlined
 def _clear_displacements(n, many):
-    """No displacements, and no contacts to visit but those that are asked to open."""
+    """Clear displacements, and flag only contacts with a target above 0 for a visit."""
     for b in range(many.bodies.state.shape[0]):
         many.sweeps.pushed[b] = 0
         put_padded(many.sweeps.motion, b, 0, (0.0, 0.0, 0.0))
@@ -67,7 +67,7 @@ def _list_all(n, many):
 
 @inlined
 def _list_pushed(n, many):
-    """List the contacts of bodies that were pushed: how many."""
+    """List the contacts of bodies that were pushed; return their number."""
     count = 0
     for k in range(n):
         b = many.contacts.bodies[k, 1]
@@ -79,7 +79,7 @@ def _list_pushed(n, many):
 
 @kernel
 def sweep_positions(n, goal, limit, many):
-    """Displacements `many.bodies.twist` that bring the n contacts to their targets within `goal` [m]: how many sweeps.
+    """Displacements `many.bodies.twist` that bring the n contacts to their targets within `goal` [m]; counts sweeps.
 
     `many.sweeps.pushed` is 0 for bodies that stay where they are.
     """

@@ -47,7 +47,7 @@ def world_kinetic_energy(offset_frame, many):
 
 @inlined
 def _blend_momenta(s, many):
-    """Move the momenta of all bodies by the share s towards those with all of the rebound."""
+    """Move the momenta of all bodies by the share s towards those of the full rebound."""
     for b in range(many.bodies.state.shape[0]):
         v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
         v_full, L_full = (
@@ -67,7 +67,7 @@ def _save_impulses(n, many):
 
 @inlined
 def _blend_impulses(n, s, many):
-    """Move the impulses of the n contacts by the share s towards those with all of the rebound."""
+    """Move the impulses of the n contacts by the share s towards those of the full rebound."""
     for k in range(n):
         p = row_vector(many.contacts.impulse, k, 0)
         put_vector(
@@ -80,14 +80,14 @@ def _blend_impulses(n, s, many):
 
 @inlined
 def _is_to_rebound(k, many):
-    """True if the target of contact k is that of Newton's law with its restitution, and not 0."""
+    """True if the target of contact k is a rebound by Newton's law, other than 0."""
     goal = many.contacts.target[k, 0]
     return goal != 0.0 and goal == -many.contacts.restitution[k] * many.contacts.speed[k]
 
 
 @inlined
 def _set_plastic_targets(n, many):
-    """Targets of what touches without rebound, and momenta as before the impact."""
+    """Set targets without rebound for touching contacts, and momenta to those before the impact."""
     for k in range(n):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
         if _is_to_rebound(k, many):
@@ -99,7 +99,7 @@ def _set_plastic_targets(n, many):
 
 @inlined
 def _has_rebound(n, many):
-    """True if any contact is to leave with a speed."""
+    """True if any contact has a rebound."""
     for k in range(n):
         if _is_to_rebound(k, many):
             return True
@@ -108,7 +108,7 @@ def _has_rebound(n, many):
 
 @kernel
 def _apply_frictionless(n, offset_frame, many):
-    """The plastic impact without friction from the momenta before: no solve with friction came out right."""
+    """Apply a plastic impact without friction from the momenta before, after all solves with friction have failed."""
     _set_plastic_targets(n, many)
     _update_twists(offset_frame, many)
     solve_frictionless_and_apply(n, many)
@@ -116,9 +116,9 @@ def _apply_frictionless(n, offset_frame, many):
 
 @kernel
 def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
-    """Solve and apply the n contacts of an impact with as much rebound as there is energy for.
+    """Solve and apply the n contacts of an impact, with the largest rebound that creates no energy.
 
-    With friction the law itself may ask for more than there is; without, what a loose solve leaves.
+    With friction the law itself may require more energy than there is; without friction a loose solve may create some.
     """
     _save_momenta(_PRE_IMPACT, many)
     before = world_kinetic_energy(offset_frame, many)

@@ -1,4 +1,4 @@
-"""From a posed contact problem to changed momenta."""
+"""Solve a contact problem, and change momenta by its impulses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.kernels.state.body import report_solve
 
 @inlined
 def apply_impulses(n, many):
-    """Momenta of the bodies after the contact impulses; v from the solve, L + Σ r x p."""
+    """Apply the contact impulses to the momenta of the bodies; v from the solve, L + Σ r x p."""
     for k in range(n):
         p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
@@ -40,7 +40,7 @@ def apply_impulses(n, many):
 
 @kernel
 def solve_and_apply(n, world, friction, report, many):
-    """Solve the contact problem of the stage, change the momenta of the bodies by it, and note it in the report."""
+    """Solve the contact problem of the stage, apply its impulses to the bodies, and add it to the report."""
     iterations, residual, method = solve_contacts(n, friction, many)
     apply_impulses(n, many)
     report_solve(report, world, residual, iterations, method, many.settings[0].tolerance)
@@ -48,6 +48,6 @@ def solve_and_apply(n, world, friction, report, many):
 
 @kernel
 def solve_frictionless_and_apply(n, many):
-    """`solve_and_apply` without friction, where a solve with it came out wrong; the report has that one already."""
+    """Do `solve_and_apply` without friction, after a failed solve with it that the report already counts."""
     solve_all_frictionless(n, many)
     apply_impulses(n, many)

@@ -1,4 +1,4 @@
-"""A step of worlds whose bodies touch each other: substeps, each a visible list of stages (`substep`).
+"""Step of worlds whose bodies touch each other: substeps, each a visible list of stages (`substep`).
 
 Where the plan asks for an error instead of a number of substeps, each of them is cut into parts that meet it
 (`adaptive_substep`).
@@ -92,5 +92,5 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_many(queue, grid, arrays, switches, restitution, kept, sleep, records, many):
-    """Advance the worlds that no other thread has taken, of bodies that touch each other: `advance_world`."""
+    """Advance the worlds that no other thread has taken, with bodies that touch each other: `advance_world`."""
     _advance_worlds(queue, (grid, arrays, switches, restitution, kept, sleep, records, many))

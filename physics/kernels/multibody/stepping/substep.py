@@ -1,4 +1,4 @@
-"""Time stepping, bodies that touch each other: a substep of a world as a list of stages.
+"""Time stepping of bodies that touch each other: a substep of a world as a list of stages.
 
 The stages are those of `physics.kernels.time_stepping.step`, for all bodies of a world at once. y = (x, q, v, L) are
 their states, M their masses and inertias, f the loads, J the Jacobian of the contacts, u their velocities, p their
@@ -51,9 +51,9 @@ OVERLAP_SHARE = 1.0e-2
 
 @inlined
 def record_penetration(n, world, memory, report, many):
-    """Deepest penetration of the set into the world's report, and contacts for which there was no room.
+    """Record the set's deepest penetration in the world's report, and the number of contacts without room.
 
-    Nothing is remembered, not even the length of a stage, where the bodies were put: what overlaps there is told.
+    After bodies were placed by a user the memory is empty, even of a stage's length; their overlap is reported.
     """
     is_start = memory[world, WARM_STAGE_LENGTH] == 0.0
     for k in range(n):
@@ -72,7 +72,7 @@ def record_penetration(n, world, memory, report, many):
 
 @inlined
 def mark_touched(n, many):
-    """`many.bodies.touched`: bodies in a contact of the set."""
+    """Mark bodies in a contact of the set in `many.bodies.touched`."""
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
     for k in range(n):

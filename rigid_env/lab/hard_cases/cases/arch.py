@@ -44,7 +44,7 @@ def arch(stones: int, thickness: float) -> physics.Scene:
 
 
 def least_thickness(stones: int) -> float:
-    """Thickness by mean radius from which on the arch stands: the root of `missing_force`, to 1e-7 (the solver's)."""
+    """Least ratio of thickness to radius at which the arch stands: root of `missing_force`, to 1e-7."""
     low, high = 0.05, 0.2
     while high - low > SOLVED:
         middle = 0.5 * (low + high)
@@ -53,7 +53,7 @@ def least_thickness(stones: int) -> float:
 
 
 def missing_force(stones: int, thickness: float) -> float:
-    """The least sum of forces, by the weight, that must help to hold the arch: 0 where it stands unaided.
+    """Least sum of helping forces that holds the arch, by its weight; 0 if it stands unaided.
 
     The linear program of limit analysis: forces at both ends of every joint that push, with friction within Coulomb's
     law, and the weight are in equilibrium on every stone, with the help of forces and moments of any sign, whose sizes
@@ -96,12 +96,12 @@ def _weight(outline: np.ndarray) -> tuple[float, float]:
 
 
 def arches(setting: Setting) -> list[Check]:
-    """Arches of 7, 15 and 51 stones, 0.5 % thicker and 0.5 % thinner than the limit for so many.
+    """Arches of 7, 15 and 51 stones, 0.5 % thicker and 0.5 % thinner than the limit for their number of stones.
 
     Masonry of stiff stones that do not slide stands if and only if forces within it can balance its weight [1]: whether
     they can is a linear program (`missing_force`) [2]. A semicircular arch gives at hinges in five joints. With few
-    stones there may be none where it would rather have them: 7 stand from thickness/radius = 0.0957 on, 15 from 0.1061,
-    51 from 0.1074; for ever thinner stones it is 0.1075 [3].
+    stones there may be no joint at the best place for a hinge: 7 stand from thickness/radius = 0.0957 on, 15 from
+    0.1061, 51 from 0.1074; for ever thinner stones it is 0.1075 [3].
 
     Standing, for a minute: each of n + 1 joints may open or close by one slop at one end, which turns all that is above
     it, within 2 m, by that slop over the thickness. Falling: the least sum of helping forces, m times the weight, is by

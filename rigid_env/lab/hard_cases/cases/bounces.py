@@ -74,7 +74,7 @@ def _fall(world, steps: int) -> np.ndarray:
 
 
 def _way(y: float, v: float, new_y: float, new_v: float) -> float:
-    """Way [m] up and down in a step between two heights and speeds: along the parabola, or to the floor and up."""
+    """Path length [m] up and down in a step between two heights and speeds: a parabola, or to the floor and up."""
     if new_v > max(v, 0.0):  # hit the floor, and rises
         return max(v, 0.0) ** 2 / GRAVITY + abs(y) + abs(new_y)
     if v > 0 > new_v:
@@ -100,7 +100,7 @@ def elastic(on: Setting) -> Sequence[Check]:
 
 
 def _leaving(on: Setting, e: float, speed: float) -> float:
-    """Speed after the block has hit the floor in the first of 20 steps without gravity, by the speed before.
+    """Speed after the block's impact on the floor in the first of 20 steps without gravity, by the speed before.
 
     An engine with soft contacts needs some of these steps.
     """

@@ -98,7 +98,7 @@ def digits_of_pi(setting: Setting) -> list[Check]:
 
 
 def _collisions(setting: Setting, world) -> int:
-    """Changes of any velocity until both balls move off, the heavy one no slower."""
+    """Count changes of any velocity until both balls move off, the heavy one no slower."""
     seen = 0
     for _ in range(100_000):
         (light, heavy), place = world.linvel[0, :, 0].tolist(), float(world.pos[0, 1, 0])

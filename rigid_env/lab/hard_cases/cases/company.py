@@ -1,4 +1,4 @@
-"""Hard cases of bodies in company: a collision, a clearance, a seam and a far body change nothing that they should not.
+"""Hard cases of bodies in company: collision, clearance, seam and far body must leave other motions unchanged.
 
 Each draws placements of one scene and runs them as worlds side by side. Public reports against other engines are of
 these kinds; those of this engine are in the decisions.
@@ -85,7 +85,7 @@ def _flat(on: Setting) -> Check:
 
 
 def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
-    """Largest difference of the ball's energy above the block from e² m g h after its first bounce, by m g h."""
+    """Largest difference between the ball's energy above the block after its first bounce and e² m g h, by m g h."""
     fall = np.sqrt(2 * h / GRAVITY)
     worst = np.zeros(len(h))
     for _ in range(on.steps(float((fall * (1 + e)).min()))):
@@ -154,8 +154,8 @@ def _offset(across, other, R, clearance: float) -> float:
 def sliding_past(on: Setting) -> Sequence[Check]:
     """A block slides past a heavy one at a clearance, and is slowed by the floor alone: v = v₀ - μ g t.
 
-    The other block lies beside its way, its edge nearest of all that it has in front. What the solver leaves of the
-    speed turns the block, so that its corner may reach the other: the clearances are above tolerance times way.
+    The other block lies beside its way, its edge nearest of all that it has in front. The solver's residual turns the
+    block, so that its corner may reach the other: the clearances are above tolerance times way.
     """
     count, checks = on.pick(24, 6), []
     for speed in (1.0, 5.0):

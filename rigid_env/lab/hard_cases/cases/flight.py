@@ -68,7 +68,7 @@ def _body_rates(world) -> np.ndarray:
 
 
 def _crossing(world, dt: float, longest: float) -> float:
-    """Time at which the body's ω₂ next falls through 0 [s], NaN if it does not; by the cubic with the slopes of Euler.
+    """Time [s] of the next zero of the body's ω₂, NaN without one; by the cubic with the slopes of Euler's equations.
 
     I₂ ω̇₂ = (I₃ - I₁) ω₃ ω₁.
     """

@@ -64,7 +64,7 @@ def _incline(angle: float, mu: float) -> physics.Scene:
 
 
 def _tilted(angle: float, mu: float) -> physics.Scene:
-    """The same with a wall that is turned."""
+    """The incline as a turned wall, gravity unchanged."""
     normal = (math.sin(angle), math.cos(angle), 0.0)
     body = block(tuple(0.5 * SIZE[1] * n for n in normal), quat=turned(-angle))
     return physics.Scene([body], [physics.HalfSpace(normal)], laws(0.0, mu))
@@ -155,8 +155,8 @@ def pressed(on: Setting) -> Sequence[Check]:
     """Pressed into a corner with 1e3 to 1e6 times its weight: the walls balance it; let go, no energy comes of it.
 
     Statics: the sum of the wall forces is the load. A step is solved to the tolerance, relative to its free speed a dt
-    under the load: it moves by that share of a dt², which the next one finds, and by the slop. What is let go has no
-    more energy than before but that of its weight over a slop.
+    under the load: it moves by that share of a dt², which the next one finds, and by the slop. After the release the
+    block's energy may exceed that before by its weight over a slop.
     """
     checks, balance, gain, wrong, slop = [], 0.0, 0.0, 0, on.slop * RADIUS
     for times in (1e3, 1e4, 1e5, 1e6):
@@ -185,7 +185,7 @@ CORNER = 50.0  # how far the corner is from the origin, along each axis [m]
 
 
 def _press(on: Setting, push: np.ndarray) -> tuple:
-    """The block, pushed into the corner for 2 s: world, farthest from its start [m], energies before and after [J]."""
+    """Push the block into the corner for 2 s: (world, largest distance from its start [m], energies [J])."""
     place = np.array(SIZE) / 2 - CORNER
     scene = boxed(block(tuple(place)), (CORNER,) * 3, 0.2, 0.5, (0, -GRAVITY, 0))
     world = on.world(scene)
@@ -200,9 +200,10 @@ def painleve(on: Setting) -> Sequence[Check]:
     """A rod slides on one end at θ, μ > (tanθ + 4 cotθ)/3: no force obeys Coulomb's law, and yet an answer is due.
 
     With A_nn = (1 + 3 cosθ (cosθ - μ sinθ))/m < 0 a contact force and its friction push the end in (Stewart,
-    *Rigid-body dynamics with friction and impact*, SIAM Review 42, 2000, section 1; the bound is A_nn = 0). What is due
-    is finite, does not go in, and gains no energy. Where forces are looked for (event-driven) the report says that an
-    impulse had to do (`fallbacks`); time stepping asks for impulses, for which there is no paradox (Stewart, Trinkle).
+    *Rigid-body dynamics with friction and impact*, SIAM Review 42, 2000, section 1; the bound is A_nn = 0). The answer
+    must be finite, must not penetrate, and must not gain energy. Where forces are looked for (event-driven) the report
+    says that an impulse had to do (`fallbacks`); time stepping asks for impulses, for which there is no paradox
+    (Stewart, Trinkle).
     """
     length, thin, mass, theta = 2.0, 1e-3, 1.0, math.radians(63.4)
     mu = 1.3 * (math.tan(theta) + 4 / math.tan(theta)) / 3

@@ -53,7 +53,7 @@ def _released(on: Setting, scene: physics.Scene, duration: float, wall: int) -> 
 
 
 def _time_checks(on: Setting, scene: physics.Scene, time: float, end: float, wall: int) -> list[Check]:
-    """Event-driven: it is let go once, when it must be.
+    """Checks, event-driven: the body leaves once, at the right time.
 
     A push is off by ten times the tolerance at most (some ten steps, each to a hundredth of it, by what amplifies
     them), in the weights by which it falls in the body's time; and 1e-10 s are a million units in the last place.
@@ -213,7 +213,7 @@ def sticks_again(on: Setting) -> Sequence[Check]:
 
 
 def _stick_checks(on: Setting, scene: physics.Scene) -> list[Check]:
-    """It slips once and sticks once, when it must, and nothing else happens to it."""
+    """Checks that the body slips once and sticks once, at the right times, without further events."""
     found = physics.simulate(scene, STICKS + 0.01, on.accuracy, on.dt)
     times = {kind: [event.t for event in found.events if event.kind == kind] for kind in ("slip", "stick")}
     late = {kind: times[kind][-1] if times[kind] else math.nan for kind in times}

@@ -1,4 +1,4 @@
-"""Random everything: scenes, parameters, states and wrenches, many worlds at once, held against laws.
+"""Hard case of random scenes, parameters, states and wrenches: many worlds at once, checked against laws.
 
 What is drawn here is drawn by `benchmarks.soak` as well, for as long as one likes.
 """
@@ -49,7 +49,7 @@ BODIES = {
 
 
 def scene_of(family: str) -> physics.Scene:
-    """The scene whose plan a family of `BODIES` shares; all its numbers are drawn anew."""
+    """Scene of a family of `BODIES`, which fixes the plan; all its numbers are drawn anew."""
     effects = [physics.Gravity(), physics.Contact(0.0), physics.Friction(0.0)]
     return physics.Scene(BODIES[family], WALLS, effects)
 
@@ -134,7 +134,7 @@ class Look:
 
 
 def look(world: physics.World) -> Look:
-    """The present state of the worlds."""
+    """Quantities of the laws in the present state of the worlds."""
     about = physics.diagnose(world)
     mass = (1.0 / world.params[:, at.INV_MASS]).reshape(world.worlds, -1)
     depth = np.abs(world.pos).max(axis=-1) - HALF_WIDTH
@@ -149,7 +149,7 @@ def look(world: physics.World) -> Look:
 
 
 def push(world: physics.World, wrench: np.ndarray) -> np.ndarray:
-    """(worlds,) by how much a second of these wrenches and gravity can raise √(2 K) [√W·√s / s].
+    """Bound (worlds,) of the growth of √(2 K) by a second of these wrenches and gravity [√W·√s / s].
 
     With A² = Σ |F + m g|²/m + |τ|²/I_min, dK/dt = Σ (F + m g)·v + τ·ω <= A √(2 K) by Cauchy and Schwarz, as
     2 K = Σ m v² + ω·I ω. So d√(2 K)/dt <= A, whatever contacts do, which only take.
@@ -188,11 +188,11 @@ class Outcome:
 
     @classmethod
     def start(cls, worlds: int) -> Outcome:
-        """Nothing has gone wrong."""
+        """Outcome of worlds without any fault."""
         return cls(np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, dtype=np.bool_))
 
     def broken_laws(self, limit: float) -> np.ndarray:
-        """(worlds,) bool: those in which something went wrong, a gain above `limit` included."""
+        """Worlds (worlds,) bool that broke a law, a gain above `limit` included."""
         return self.is_broken | (self.escaped > 0) | (self.gain > limit)
 
     def law(self, index: int, limit: float) -> str:
@@ -204,7 +204,7 @@ class Outcome:
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
-        """Hold a step against the laws; the state after it. `push_now`: see `push`; None: no wrench."""
+        """Check a step against the laws, and return the state after it. `push_now`: see `push`; None: no wrench."""
         now, report = look(world), world.report
         self.is_broken |= ~now.is_finite | (report.faults > 0) | (report.left_out > 0)
         np.maximum(self.escaped, now.escaped, out=self.escaped)
@@ -227,7 +227,7 @@ def drive(
     rng: np.random.Generator,
     told: Callable[[int, str], None] = lambda index, law: None,
 ) -> Outcome:
-    """Draw all worlds of a batch anew and run them: pushed, pushed otherwise, free.
+    """Draw all worlds of a batch anew and run them under one wrench, another wrench, and none.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ def overlap(on: Setting) -> Sequence[Check]:
 
 def _throw(scale: float = 1.0, time: float = 1.0, heavy: float = 1.0, offset=(0.0, 0.0, 0.0), boost=(0.0, 0.0, 0.0),
            friction: float = 0.5) -> physics.Scene:  # fmt: skip
-    """The block thrown tilted onto a floor; lengths by `scale`, times by `time`, masses by `heavy`."""
+    """Throw the block tilted onto a floor; `scale`, `time` and `heavy` multiply lengths, times and masses."""
     offset = np.asarray(offset)
     body = physics.Block(
         np.array(SIZE) * scale, MASS * heavy, pos=np.array([0.1, 2.6, 0.2]) * scale + offset, quat=TILT,
@@ -83,12 +83,12 @@ def _path(on: Setting, scene: physics.Scene, seconds: float = 2.0, time: float =
 
 
 def _apart(one, other) -> float:
-    """Largest difference of places [m] and of what attitudes make of the block's radius [m]."""
+    """Largest difference of places, and of attitudes times the block's radius [m]."""
     return max(float(np.abs(one[0] - other[0]).max()), RADIUS * float(np.abs(one[1] - other[1]).max()))
 
 
 def _growth(on: Setting, make: Callable[..., physics.Scene], path) -> float:
-    """By how much the scene multiplies a nudge of its start, at least 1: of three directions the largest."""
+    """Factor, at least 1, by which the scene magnifies a nudge of its start: the largest of three directions."""
     nudges = np.eye(3) * NUDGE
     return max(1.0, *(_apart(_path(on, make(offset=tuple(nudge * (1, 0, 1)), boost=tuple(nudge))), path) / NUDGE
                       for nudge in nudges))  # fmt: skip
@@ -218,7 +218,7 @@ def backwards(on: Setting) -> Sequence[Check]:
 
 
 def _there_and_back(world, steps: int) -> np.ndarray:
-    """Place (3,) after `steps`, velocities turned round, and `steps` again."""
+    """Place (3,) after `steps` forwards, a reversal of all velocities, and `steps` again."""
     world.step(steps=steps)
     world.set_state(linvel=-np.array(world.linvel), angvel=-np.array(world.angvel))
     world.step(steps=steps)

@@ -23,7 +23,7 @@ WIDE = 1e3  # half width of a box whose other walls are never met [m]
 
 
 def block(pos=(0.0, SIZE[1] / 2, 0.0), size=SIZE, mass=MASS, **start) -> physics.Block:
-    """The block 5 x 3 x 2 m of 6 kg, face down on the floor if nothing else is said."""
+    """The block 5 x 3 x 2 m of 6 kg, by default face down on the floor."""
     return physics.Block(size, mass, pos=pos, **start)
 
 
@@ -62,7 +62,7 @@ def turned(angle: float, axis=(0.0, 0.0, 1.0)) -> tuple[float, float, float, flo
 
 
 def energy(world, scene: physics.Scene) -> float:
-    """Kinetic and potential energy of all bodies [J]; from the state alone, so that it serves any engine."""
+    """Kinetic and potential energy of all bodies [J], from the state alone, for any engine."""
     state = (np.asarray(world.pos), np.asarray(world.quat), np.asarray(world.linvel), np.asarray(world.angvel))
     return float(mechanical_energy(scene, *state).sum())
 
@@ -95,7 +95,7 @@ def is_finite(world) -> bool:
 
 
 def none_of_finite(what: str, world) -> Check:
-    """No number of the state is anything but finite."""
+    """Check that every number of the state is finite."""
     return none_of(what, not is_finite(world))
 
 
@@ -107,12 +107,12 @@ def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), bodies: int = 1) -> np
 
 
 def of_last_step(on: Setting, mu: float) -> float:
-    """By how much a step in which sliding ends moves too far or too short [m]: the speed left, μ g dt at most, dt."""
+    """Bound of the error in place of a step in which sliding ends [m]: the speed left, μ g dt at most, times dt."""
     return 0.0 if on.is_event_driven else mu * GRAVITY * on.dt**2
 
 
 def early(on: Setting, body: physics.Body) -> float:
-    """Way [m] by which one hit may move the path of a body that flies between walls.
+    """Bound of the displacement [m] that one hit adds to the path of a body that flies between walls.
 
     Time stepping finds the time of a hit at constant speed by one division: 0. The event-driven scheme takes contacts
     that would touch within 1e-10 and ten tolerances of the time R/v as one impact (theory, section 8): one of them is

@@ -37,7 +37,7 @@ def farthest(world, start: np.ndarray) -> float:
 
 
 def loads(world: physics.World) -> np.ndarray:
-    """(bodies,) vertical force from below on every body [N]; all contacts must be with what is below or above."""
+    """Vertical force (bodies,) from below on every body [N]; all contacts must be with neighbours above and below."""
     found = np.zeros(world.body_count)
     for (a, b), force in zip(world.contact_ends().tolist(), world.contacts()[1]):
         lower_is_second = b < 0 or world.pos[0, b, 1] < world.pos[0, a, 1]
@@ -94,5 +94,5 @@ def standing(setting: Setting, what: str, moved: float, wrong: int, layers: int,
 
 
 def load_error(world: physics.World, expected: np.ndarray) -> float:
-    """Largest error of what a body carries, as a share of the whole weight."""
+    """Largest error of the load of a body, as a share of the whole weight."""
     return float(np.abs(loads(world) - expected).max() / expected.max())

@@ -29,7 +29,7 @@ TRUTH = 1e-11  # relative tolerance of the equations of motion by DOP853
 
 
 def pendulum(angle: float, rate: float, duration: float) -> float:
-    """φ(duration) of φ̈ = rate² sinφ from rest at `angle` [rad]: what stands on an edge, φ from the vertical."""
+    """Angle φ(duration) from the vertical of a body that tips: φ̈ = rate² sinφ from rest at `angle` [rad]."""
     run = solve_ivp(
         lambda t, y: (y[1], rate * rate * math.sin(y[0])), (0.0, duration), (angle, 0.0), "DOP853", rtol=TRUTH,
         atol=1e-3 * TRUTH * abs(angle),
@@ -38,7 +38,7 @@ def pendulum(angle: float, rate: float, duration: float) -> float:
 
 
 def _slack(on: Setting, rate: float, duration: float) -> float:
-    """Share by which an angle that grows at `rate` may be off after `duration`.
+    """Allowed relative error, after `duration`, of an angle that grows at `rate`.
 
     The midpoint step makes e^(λh) into (1 + λh/2)/(1 - λh/2) or, with positions drifting on either side of it,
     exp(2 asinh(λh/2)): rates λ (1 + (λh)²/12) and λ (1 - (λh)²/24). What grows for λT is then off by (λh)² λT/12 at
@@ -111,7 +111,7 @@ def tips_when_pushed(on: Setting) -> Sequence[Check]:
 
 
 def _pushed_over(force: float, z: float, duration: float) -> float:
-    """Angle that the pushed block has tipped by [rad]."""
+    """Tipping angle of the pushed block [rad]."""
     b, h = SIZE[0] / 2, SIZE[1] / 2
     inertia = block().inertia[2, 2] + MASS * (b * b + h * h)
 
@@ -244,7 +244,7 @@ def housner(on: Setting) -> Sequence[Check]:
 
 
 def _to_zero(angle: float, rate: float, slowing: float) -> float:
-    """Time in which angle - rate τ - slowing τ²/2 is 0 [s]."""
+    """Time at which angle - rate τ - slowing τ²/2 is 0 [s]."""
     return 2 * angle / (rate + math.sqrt(rate * rate + 2 * slowing * angle))
 
 

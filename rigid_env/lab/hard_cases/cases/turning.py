@@ -24,7 +24,7 @@ def _rod(**start) -> physics.Block:
 
 
 def _things() -> dict[str, tuple[physics.Body, float, float]]:
-    """Body, and radii of the balls about its centre that it holds and that hold it [m]."""
+    """Body, and radii [m] of balls about its centre: the largest inside it, the smallest around it."""
     size = 0.1
     corners = tuple(tuple(float(s * size) for s in row) for row in (*np.eye(3), *-np.eye(3)))
     return {
@@ -35,12 +35,12 @@ def _things() -> dict[str, tuple[physics.Body, float, float]]:
 
 
 def _half_turn(on: Setting) -> int:
-    """Steps in which the slowest rod has turned by more than π."""
+    """Number of steps in which the slowest rod has turned by more than π."""
     return math.ceil(math.pi / min(TURNS)) + 1
 
 
 def _spread(count: int, k: float) -> np.ndarray:
-    """Numbers evenly over 0 to 1, in an order of their own for each k (multiples of an irrational number)."""
+    """Numbers evenly spread over 0 to 1, in another order for each k (multiples of an irrational number)."""
     return np.mod(np.arange(count) * math.sqrt(k) + 0.5, 1.0)
 
 

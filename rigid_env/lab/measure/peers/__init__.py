@@ -1,4 +1,4 @@
-"""Other engines on our scenes: one file per engine, one signature (`contender.Engine`); imported when measured.
+"""Other engines on our scenes: one file per engine, one interface (`contender.Engine`), imported on demand.
 
 Each gives its own settings for a scene, its defaults first and then those that did best on such scenes, and says
 `Unsupported` where it cannot express one. What belongs to the scene (masses, gravity, friction, restitution, no

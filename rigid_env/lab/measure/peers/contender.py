@@ -1,4 +1,4 @@
-"""Interface of a peer, and its part in a measurement beside our own engine."""
+"""Interface of a peer, and its contender in a measurement beside our own engine."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Unsupported(Exception):
-    """A peer cannot express a scene; the message says what."""
+    """Error of a peer that cannot express a scene; the message says why."""
 
 
 def refuse_meetings(scene: physics.Scene) -> None:
-    """For a peer that is only given contact with walls.
+    """Refuse scenes whose bodies may meet, for a peer that gets contact with walls only.
 
     Raises
     ------
@@ -40,10 +40,10 @@ class Run(Protocol):
     """A scene in a peer, at one setting and one step."""
 
     def restart(self) -> None:
-        """Back to the scene's start, with nothing remembered."""
+        """Return to the scene's start and clear the peer's memory."""
 
     def advance(self, steps: int) -> None:
-        """Take steps by the engine's quickest way."""
+        """Take steps in the engine's quickest way."""
 
     def state(self) -> State:
         """pos (bodies, 3) [m], quat (bodies, 4), linvel (bodies, 3) [m/s], angvel (bodies, 3) [rad/s].
@@ -64,7 +64,7 @@ class Engine(Protocol):
     version: str
 
     def settings(self, scene: physics.Scene) -> Mapping[str, Mapping]:
-        """Options by name of setting, the engine's defaults first."""
+        """Options by name of the setting, the engine's defaults first."""
 
     def open(self, scene: physics.Scene, dt: float, **options) -> Run:
         """Build a scene.
@@ -102,7 +102,7 @@ class PeerContender:
         return self.peer.name
 
     def watch(self, steps: int) -> physics.Trajectory:
-        """Samples at the start and after each step; a peer tells of no events and has no reports.
+        """Samples at the start and after each step; a peer has neither events nor reports.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class PeerContender:
         return physics.Trajectory(t, pos, quat, linvel, angvel, energy=energy, events=(), reports=())
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Restart, and the steps that are timed."""
+        """Functions that restart the scene, and take the timed steps."""
         run = self._open()
         return run.restart, lambda: run.advance(steps)
 
@@ -157,11 +157,11 @@ def friction(scene: physics.Scene) -> float:
 
 
 def gravity(scene: physics.Scene) -> tuple[float, float, float]:
-    """Acceleration [m/s²]; zeros without."""
+    """Acceleration of gravity [m/s²]; zeros without."""
     effect = scene.effect(physics.Gravity)
     return tuple(effect.acceleration) if effect else (0.0, 0.0, 0.0)
 
 
 def walls(scene: physics.Scene) -> tuple[physics.HalfSpace, ...]:
-    """The walls that act: none without contact."""
+    """Walls of the scene; none without contact."""
     return tuple(scene.walls) if scene.effect(physics.Contact) else ()

@@ -101,7 +101,7 @@ def dissipation(scene: physics.Scene) -> float:
 
 
 def _arrival(scene: physics.Scene, body: physics.Body, wall: physics.HalfSpace) -> float:
-    """Speed [m/s] at which a body that does not turn reaches a wall; 0 where it does not."""
+    """Speed [m/s] of a body at a wall, if it does not turn; 0 where it does not reach one."""
     normal, R = np.array(wall.normal), rotation_matrices(np.array(body.quat))
     reach = body.dimensions * (R.T @ normal)
     extent = np.abs(reach).sum() if body.kind == "block" else np.linalg.norm(reach)

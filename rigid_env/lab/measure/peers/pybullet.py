@@ -49,7 +49,7 @@ class PyBullet:
         return TOUCHING if walls(scene) else FREE
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
-        """See `contender.Engine`; ellipsoids, and inertia tensors that are not diagonal, it cannot express."""
+        """See `contender.Engine`; PyBullet cannot express ellipsoids and inertia tensors that are not diagonal."""
         refuse_meetings(scene)
         for body in scene.bodies:
             if body.kind == "ellipsoid":
@@ -137,7 +137,7 @@ class _Run:
 
 @contextlib.contextmanager
 def _silence():
-    """Keep what its C code prints at import and for each client off the screen: below Python, at the descriptors."""
+    """Keep the output of its C code, at import and for each client, off the screen, by redirecting the descriptors."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = os.dup(1), os.dup(2)
