@@ -5,7 +5,7 @@ from __future__ import annotations
 from physics.kernels.compile.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
+from physics.kernels.multibody.data.contact_set import PARTED, add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.multibody.solver.solve import solve_all_frictionless, solve_contacts
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import report_solve
@@ -36,6 +36,24 @@ def apply_impulses(n, many):
                 ),
             )
             put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.twist, b, 0))
+            if many.contacts.owner[k] == PARTED:
+                _balance_moments(k, a, b, p, many)
+
+
+@kernel
+def _balance_moments(k, a, b, p, many):
+    """Take the moment of the impulse p at one point of contact k, and of -p at the other, from both spins.
+
+    Each takes a part by its m r². Points of other contacts are one and the same.
+    """
+    x = add_scaled(row_vector(many.bodies.state, a, at.POS), 1.0, row_vector(many.contacts.arm, k, 0))
+    y = add_scaled(row_vector(many.bodies.state, b, at.POS), 1.0, row_vector(many.contacts.arm, k, 3))
+    moment = qt.cross(subtract(x, y), p)
+    one = many.bodies.work[a].radius ** 2 / many.bodies.inv_mass[a]
+    share = one / (one + many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b])
+    for body, part in ((a, share), (b, 1.0 - share)):
+        L = row_vector(many.bodies.state, body, at.ANGMOM)
+        put_vector(many.bodies.state, body, at.ANGMOM, add_scaled(L, -part, moment))
 
 
 @kernel
