@@ -7,9 +7,8 @@ right, y up, z towards the viewer; the block's own axes are its edges. The state
     v = P/M,    ω = I⁻¹ L     velocities, where I⁻¹ = R I_body⁻¹ Rᵀ and R is the rotation matrix of q
     dY/dt = (v, ½ ω q, F, τ)
 
-A vertex at the arm r from x touches a wall: u is its velocity along the axes n, t1, t2 of the wall, n out of the wall.
-All k contacts together have u = J (v, ω) and A = J diag(M, I)⁻¹ Jᵀ, the Delassus matrix. `step` repeats these stages
-until its time is used up. They have the same names in `physics/kernels/event_driven/step.py`.
+A contact is a vertex at a wall, r from x. Its velocity along n, t1, t2 is u = J (v, ω), n out of the wall. The Delassus
+matrix is A = J diag(M, I)⁻¹ Jᵀ. `step` repeats these stages, which `physics/kernels/event_driven/step.py` names alike:
 
 1. Hold loads         F = M g, and τ = 0: gravity exerts no torque                         `derivative`
 2. Find contacts      vertices whose gap n·(x + r) - offset is zero                        `find_contacts`
@@ -19,13 +18,12 @@ until its time is used up. They have the same names in `physics/kernels/event_dr
 6. Correct positions  zero gaps and velocities of contacts, which the error of RK4 moves   `correct_positions`
 7. Rest               nothing changes where dY/dt = 0                                      `step`
 
-All contacts take part at once in one complementarity problem [2]_. Friction is Coulomb's, |f_t| <= μ f_n against the
-slip; in an impact, against the slip after it. Two limits: a vertex that dips into a wall and out again within h is not
-seen; and an impact with friction may gain energy (Kane's paradox), which the kernels prevent.
+All contacts are in one complementarity problem [2]_. Coulomb friction, |f_t| <= μ f_n, opposes the slip, in an impact
+the slip after it. Limits: a vertex that dips into a wall and out again within h is not seen; an impact with friction
+may gain energy (Kane's paradox), which the kernels prevent.
 
 .. [1] A. Witkin, D. Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997: Rigid Body Simulation I and II.
 .. [2] D. Baraff, *Analytical methods for dynamic simulation of non-penetrating rigid bodies*, SIGGRAPH 1989.
-.. [3] R. W. Cottle, J.-S. Pang, R. E. Stone, *The Linear Complementarity Problem*, 2009, section 4.4.
 """
 
 from dataclasses import dataclass
@@ -93,8 +91,9 @@ def quaternion_rate(omega, q):
 def derivative(scene, Y, contacts):
     """dY/dt under gravity and the forces of resting contacts."""
     _, _, v, omega = auxiliary(scene, Y)
-    J, f, _ = resting_contact(scene, Y, contacts)
-    load = J.T @ f + [*(scene.mass * np.array(scene.gravity)), 0.0, 0.0, 0.0]
+    load = scene.mass * np.array([*scene.gravity, 0.0, 0.0, 0.0])
+    if len(contacts):
+        load += resting_contact(scene, Y, contacts)[0]
     return np.concatenate([v, quaternion_rate(omega, Y[3:7]), load])
 
 
@@ -123,8 +122,8 @@ def find_contacts(scene, Y):
 def contact_jacobian(scene, Y, contacts):
     """J (3k, 6), diag(M, I)⁻¹ Jᵀ (6, 3k) and u (k, 3). A row of J: n·(v + ω x r) = n·v + (r x n)·ω."""
     arms, inverse, v, omega = auxiliary(scene, Y)
-    axes = scene.frames[contacts[:, 1]]
-    J = np.concatenate([axes, np.cross(arms[contacts[:, :1]], axes)], axis=2).reshape(-1, 6)
+    axes, r = scene.frames[contacts[:, 1]], arms[contacts[:, :1]]
+    J = np.concatenate([axes, np.cross(r, axes)], axis=2).reshape(-1, 6)
     response = np.concatenate([J[:, :3] / scene.mass, J[:, 3:] @ inverse], axis=1).T
     return J, response, (J @ np.concatenate([v, omega])).reshape(-1, 3)
 
@@ -138,12 +137,12 @@ def resolve_impacts(scene, Y):
         J, response, _ = contact_jacobian(scene, Y, contacts)
         u[:, 0] *= np.where(np.abs(u[:, 0]) > SLOW, 1 + scene.restitution, 1.0)  # u⁺ + e u⁻ = A p + (1 + e) u⁻
         p = solve_contacts(J @ response, u.ravel(), scene.friction, 0 * u[:, 1:])
-        Y = np.concatenate([Y[:7], Y[7:] + J.T @ p])
+        Y = Y + np.concatenate([np.zeros(7), J.T @ p])
     raise ArithmeticError("contacts still approach after 100 impacts at one time")
 
 
 def resting_contact(scene, Y, contacts):
-    """J, forces f (3k,) [N] and accelerations a (k, 3) [m/s²] of contacts that neither approach nor leave."""
+    """Load Jᵀf (6,), forces f and accelerations a (k, 3) [N, m/s²] of contacts that neither approach nor leave."""
     arms, inverse, _, omega = auxiliary(scene, Y)
     J, response, u = contact_jacobian(scene, Y, contacts)
     turn = star(inverse @ np.cross(Y[10:], omega)) + star(omega) @ star(omega)  # without forces ω̇ = I⁻¹ (L x ω)
@@ -151,7 +150,7 @@ def resting_contact(scene, Y, contacts):
     b = np.einsum("kij,kj->ki", scene.frames[contacts[:, 1]], free).ravel()
     slip = u[:, 1:] * contacts[:, 2:] / np.maximum(np.linalg.norm(u[:, 1:], axis=1, keepdims=True), ROUNDING)
     f = solve_contacts(J @ response, b, scene.friction, slip)
-    return J, f, (J @ response @ f + b).reshape(-1, 3)
+    return J.T @ f, f.reshape(-1, 3), (J @ response @ f + b).reshape(-1, 3)
 
 
 def solve_contacts(A, b, mu, slip):
@@ -165,13 +164,11 @@ def solve_contacts(A, b, mu, slip):
     scale, unit = A.diagonal().max(), np.abs(b).max() or 1.0
     A, b = A / scale, b / unit
     for steps in (1, 4, 16, 64, 256):
-        f = np.zeros(len(b))
-        f[::3] = lemke(A[::3, ::3], b[::3])
+        f = np.kron(lemke(A[::3, ::3], b[::3]), [1.0, 0.0, 0.0])
         for part in np.linspace(0.0, mu, steps + 1)[1:]:
             for _ in range(10):
                 residual = natural_map(A, b, part, slip, f)
-                is_solved = np.abs(residual).max() <= ROUNDING * max(1.0, np.abs(f).max())
-                if is_solved:
+                if is_solved := np.abs(residual).max() <= ROUNDING * max(1.0, np.abs(f).max()):
                     break
                 slopes = [(natural_map(A, b, part, slip, f + df) - residual) / 1e-7 for df in 1e-7 * np.eye(len(f))]
                 f -= np.linalg.lstsq(np.transpose(slopes), residual, rcond=1e-6)[0]
@@ -189,9 +186,8 @@ def natural_map(A, b, mu, slip, f):
 
 
 def lemke(M, q):
-    """Solution z of w = M z + q, w >= 0, z >= 0, z·w = 0 by complementary pivoting [3]_."""
-    n = len(q)
-    cover = np.linspace(1.0, 2.0, n)  # column of the artificial variable z0; unequal, so that no two rows tie
+    """Solution z of w = M z + q, w >= 0, z >= 0, z·w = 0 by pivoting (Cottle, Pang & Stone, 2009, section 4.4)."""
+    n, cover = len(q), np.linspace(1.0, 2.0, len(q))  # column of the artificial variable z0; unequal: no rows tie
     T = np.hstack([np.eye(n), -M, -cover[:, None], q[:, None]])  # columns of w, z, z0, and the right-hand side
     basis, entering, row = np.arange(n), 2 * n, np.argmin(q / cover)
     if q[row] >= 0.0:
@@ -204,8 +200,8 @@ def lemke(M, q):
             return np.bincount(basis, T[:, -1], 2 * n)[n:]
         entering = (leaving + n) % (2 * n)  # the complement of the variable that left
         ratio = np.divide(T[:, -1], T[:, entering], out=np.full(n, np.inf), where=T[:, entering] > 1e-11)
-        z0 = np.argmax(basis)  # leaves as soon as it can
-        row = z0 if ratio[z0] <= ratio.min() + ROUNDING else np.argmin(ratio)
+        ratio[np.argmax(basis)] -= ROUNDING  # z0 leaves as soon as it can
+        row = np.argmin(ratio)
         if ratio[row] == np.inf:
             break
     raise ArithmeticError("Lemke's method found no solution")
