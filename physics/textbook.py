@@ -32,10 +32,10 @@ from functools import cached_property
 import numpy as np
 
 TOUCH = 1e-8  # gap that counts as zero [m]
-SLOW = 1e-6  # contact velocity that counts as zero [m/s]: it neither bounces nor slips
+SLOW = 1e-6  # contact velocity that counts as zero [m/s]: neither an impact nor a slip
 STILL = 1e-9  # rate that counts as zero: accelerations of contacts [m/s²], dY/dt
 CORNERS = (np.arange(8)[:, None] >> np.arange(3) & 1) - 0.5  # of a unit cube (8, 3); bit j of a number: side of axis j
-ROUNDING = 1e-12  # residual that rounding leaves; of velocities [m/s], of bisected times [s]
+ROUNDING = 1e-12  # residual that rounding leaves; of bisected times [s]
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def resolve_impacts(scene, Y):
     """Y after the impacts of all contacts at once; and again, where a contact approaches after them."""
     for _ in range(100):
         contacts, u = find_contacts(scene, Y)
-        if (u[:, 0] >= -ROUNDING).all():
+        if (u[:, 0] >= -SLOW).all():
             return Y
         J, response, _ = contact_jacobian(scene, Y, contacts)
         u[:, 0] *= np.where(np.abs(u[:, 0]) > SLOW, 1 + scene.restitution, 1.0)  # u⁺ + e u⁻ = A p + (1 + e) u⁻
@@ -145,9 +145,8 @@ def resting_contact(scene, Y, contacts):
     """Load Jᵀf (6,), forces f and accelerations a (k, 3) [N, m/s²] of contacts that neither approach nor leave."""
     arms, inverse, _, omega = auxiliary(scene, Y)
     J, response, u = contact_jacobian(scene, Y, contacts)
-    turn = star(inverse @ np.cross(Y[10:], omega)) + star(omega) @ star(omega)  # without forces ω̇ = I⁻¹ (L x ω)
-    free = scene.gravity + arms[contacts[:, 0]] @ turn.T  # g + ω̇ x r + ω x (ω x r)
-    b = np.einsum("kij,kj->ki", scene.frames[contacts[:, 1]], free).ravel()
+    turn = star(inverse @ np.cross(Y[10:], omega)) + star(omega) @ star(omega)  # ω̇ x r + ω x (ω x r), Iω̇ = L x ω
+    b = np.einsum("kij,kj->ki", scene.frames[contacts[:, 1]], scene.gravity + arms[contacts[:, 0]] @ turn.T).ravel()
     slip = u[:, 1:] * contacts[:, 2:] / np.maximum(np.linalg.norm(u[:, 1:], axis=1, keepdims=True), ROUNDING)
     f = solve_contacts(J @ response, b, scene.friction, slip)
     return J.T @ f, f.reshape(-1, 3), (J @ response @ f + b).reshape(-1, 3)
@@ -212,11 +211,12 @@ def limit_stage(scene, Y, contacts, h):
     lowest = np.minimum(gaps(scene, Y), 0.0)
     lowest[tuple(contacts[:, :2].T)] = -TOUCH
     slip = contact_jacobian(scene, Y, contacts)[2][:, 1:] * contacts[:, 2:]
+    rate = derivative(scene, Y, contacts)
 
-    def is_over(t):
-        end = rk4(scene, Y, contacts, t)
-        turned = np.sum(slip * contact_jacobian(scene, end, contacts)[2][:, 1:], axis=1) < 0.0
-        return turned.any() or (gaps(scene, end) < lowest).any()
+    def is_over(t):  # Euler's step shows the end of a slip that friction reverses between the stages of RK4
+        ends = rk4(scene, Y, contacts, t), Y + t * rate
+        left = [np.sum(slip * contact_jacobian(scene, end, contacts)[2][:, 1:], axis=1) for end in ends]
+        return np.less(left, 0.0).any() or (gaps(scene, ends[0]) < lowest).any()
 
     before, after = (0.0, h) if is_over(h) else (h, h)
     while after - before > ROUNDING:
