@@ -57,7 +57,7 @@ def resting(scene, Y):
     return contacts, *tb.resting_contact(scene, Y, contacts)[1:]
 
 
-# --- the page ----------------------------------------------------------------------------------------------------------
+# --- the page -------------------------------------------------------------------------------------------------------
 
 
 def test_page_is_short_and_imports_numpy_alone():
@@ -93,7 +93,7 @@ def test_functions_have_the_names_of_the_kernels(name):
     assert any(f"\ndef {name}(" in source for source in sources)
 
 
-# --- free flight -------------------------------------------------------------------------------------------------------
+# --- free flight ----------------------------------------------------------------------------------------------------
 
 
 def test_centre_flies_on_a_parabola():
@@ -125,7 +125,7 @@ def test_inertia_is_that_of_the_exercise():
     np.testing.assert_allclose(omega, [1, 2, 3], rtol=4 * EPS)
 
 
-# --- impacts -----------------------------------------------------------------------------------------------------------
+# --- impacts --------------------------------------------------------------------------------------------------------
 
 TURNED = (0.9, 0.3, 0.2, 0.1)
 
@@ -189,7 +189,7 @@ def test_bisection_meets_the_floor_when_the_parabola_does():
     assert Y[8] == pytest.approx(0.0, abs=6 * 1e-10)
 
 
-# --- resting contact ---------------------------------------------------------------------------------------------------
+# --- resting contact ------------------------------------------------------------------------------------------------
 
 
 def test_four_coplanar_vertices_carry_the_weight():
@@ -207,7 +207,7 @@ def test_four_coplanar_vertices_carry_the_weight():
 
 
 def test_falling_on_an_edge_presses_with_less_than_the_weight():
-    """Without friction N = M g/(1 + M d²/I), d the level distance from the edge to the centre, I about the edge's axis."""
+    """Without friction N = M g/(1 + M d²/I), d the level distance of the edge from the centre, I along it."""
     angle = 0.3
     scene = tb.Scene(walls=FLOOR, friction=0.0)
     Y = on_floor((math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)))
@@ -236,7 +236,7 @@ def test_slide_ends_where_friction_has_used_its_energy_up():
     assert tb.step(scene, Y, 10.0).tolist() == Y.tolist()
 
 
-# --- complementarity ---------------------------------------------------------------------------------------------------
+# --- complementarity ------------------------------------------------------------------------------------------------
 
 
 def test_lemke_solves_random_semidefinite_problems(rng):
@@ -264,7 +264,7 @@ def test_problems_without_solution_are_refused():
         tb.solve_contacts(A, np.array([-1.0, 0.0, 0.0]), 2.0, np.array([[1.0, 0.0]]))
 
 
-# --- the exercise ------------------------------------------------------------------------------------------------------
+# --- the exercise ---------------------------------------------------------------------------------------------------
 
 
 def test_block_comes_to_rest_on_the_floor_against_a_wall():
