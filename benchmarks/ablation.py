@@ -26,9 +26,9 @@ import typer
 
 from benchmarks import machine
 from benchmarks.compile import first_step
+from benchmarks.processes import PATIENCE
 from physics.kernels.compile.fused.ablation import BASES, OPTIMISATIONS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 SCENE, ACCURACY = "drop", "balanced"
@@ -43,7 +43,8 @@ COLUMNS = {
 
 SPEEDS = """
 import json, sys
-from rigid_env.lab.measure import bodies, workloads
+from benchmarks import bodies
+from rigid_env.lab.measure import workloads
 accuracy, runs = sys.argv[1], int(sys.argv[2])
 sizes = workloads.Sizes(flights=200, rest_steps=400_000, shoves=4000)
 works = {name.lower(): getattr(workloads, name)(accuracy, sizes) for name in ("Flight", "Rest", "Shove")}

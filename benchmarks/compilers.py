@@ -22,9 +22,9 @@ from rich.progress import Progress
 
 import physics
 from benchmarks import machine
+from benchmarks.processes import PATIENCE
 from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, NUMBA, PYTHON, VARIABLE
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 WORK = ("flight", "rest", "shoved", "stack")
@@ -42,7 +42,8 @@ print(json.dumps({"cpu": cpu, "wall": wall, "memory": resource.getrusage(resourc
 
 RATES = """
 import json, statistics, sys
-from rigid_env.lab.measure import bodies, workloads
+from benchmarks import bodies
+from rigid_env.lab.measure import workloads
 accuracy, names, repeats, is_quick = sys.argv[1], sys.argv[2].split(","), int(sys.argv[3]), sys.argv[4] == "True"
 sizes = workloads.QUICK if is_quick else workloads.FULL
 found = {}

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import physics
-from rigid_env.lab.measure.processes import PATIENCE
+from benchmarks.processes import PATIENCE
 from rigid_env.lab.measure.timing import Row, Spread
 
 LIMIT = 1.5  # [s]

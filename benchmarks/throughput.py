@@ -14,8 +14,8 @@ from typing import Annotated
 import typer
 from rich.progress import Progress
 
-from benchmarks import machine, memory, start
-from rigid_env.lab.measure import bodies, crowded, environments, mujoco_scene, rows, workloads
+from benchmarks import bodies, crowded, machine, memory, start
+from rigid_env.lab.measure import environments, mujoco_scene, rows, workloads
 from rigid_env.lab.measure.table import make_table
 from rigid_env.lab.measure.timing import Row
 from rigid_env.terminal import make_console

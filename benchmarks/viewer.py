@@ -26,7 +26,7 @@ import numpy as np
 import typer
 
 from benchmarks import machine
-from rigid_env.lab.measure.processes import killed_after, wait_for_end
+from benchmarks.processes import killed_after, wait_for_end
 from rigid_env.lab.measure.table import make_table
 from rigid_env.lab.measure.timing import Row, Spread
 from rigid_env.rendering import BodyView, Frame, WallView
