@@ -27,7 +27,7 @@ from benchmarks.piles import OURS, SOLVERS, exponent
 from benchmarks.settling import Ours, Sample, Theirs, Watch
 from physics import scenes
 from rigid_env.lab.measure import mujoco_scene
-from rigid_env.lab.measure.plotting import require_matplotlib
+from rigid_env.lab.measure.plotting import make_figure
 
 LAYERS, QUICK_LAYERS = 32, 2
 PEER_LAYERS = (4, 8, 16)  # MuJoCo takes a minute for the last one
@@ -98,12 +98,7 @@ def to_json(found: dict[str, list[Sample]], accuracy: str) -> str:
 
 def draw(path: Path, found: dict[str, list[Sample]]) -> None:
     """Time of a step against its contacts, logarithmic, and what would be linear."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.5, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = make_figure(6.5, 4.5)
     panel = figure.subplots()
     for color, (name, samples) in zip(("#0072b2", "#d55e00", "#cc79a7"), found.items()):
         slope = fit(samples)

@@ -25,7 +25,7 @@ from physics import scenes
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from rigid_env.lab.measure import mujoco_scene
-from rigid_env.lab.measure.plotting import require_matplotlib
+from rigid_env.lab.measure.plotting import make_figure
 from rigid_env.lab.measure.workloads import STEP
 
 PILES, QUICK_PILES = (25, 50, 100, 200, 400), (5, 10)
@@ -87,12 +87,7 @@ def _note(name: str, falling: Sample, lying: Sample, found: dict[str, Series]) -
 
 def draw(path: Path, found: dict[str, Series], spreads: list[Sample]) -> None:
     """Time against what is found, side by side, logarithmic: piles that lie, that fall, and the broad phase."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = make_figure(15.0, 4.0)
     panels = (
         ("a step of a pile that lies", "contacts", {name: series["piles"] for name, series in found.items()}),
         ("a step while it falls and settles", "contacts", {name: series["falling"] for name, series in found.items()}),

@@ -202,20 +202,23 @@ def hard_cases(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, with limits for them.")] = False,
     json: Json = None,
     plot: Plot = None,
-    markdown: Annotated[
-        Path | None, output_option("--markdown", ".md", help="Write a page such as docs/hard-cases.md.")
-    ] = None,
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
-        from rigid_env.lab.hard_cases.command import run as run_them
+        from rigid_env.hard_cases import registry
+        from rigid_env.lab.hard_cases.picture import write_picture
+        from rigid_env.lab.hard_cases.report import make_plan, run_and_show
 
         console = make_console()
         plot, lacking = drawable(plot, console)
-        files = (json, plot, markdown)
-        report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)
-        for path in written:
-            tell_file(path, console)
+        plan = make_plan(registry.find(cases or ()), accuracy, dt, steps, not quick, peers)
+        make_parents(json, plot)
+        report = run_and_show(console, plan, json)
+        if json:
+            tell_file(json, console)
+        if plot:
+            write_picture(plot, report)
+            tell_file(plot, console)
     end(report.is_complete, lacking)
     if report.has_failed:
         raise typer.Exit(1)
