@@ -72,9 +72,6 @@ def effects(
     ] = None,
     accuracy: Accuracy = "balanced",
     json: Json = None,
-    markdown: Annotated[
-        Path | None, output_option("--markdown", ".md", help="Put the table into this page, too.")
-    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
 ) -> None:
     """Measure what each effect costs: steps per second of its scene with it and without."""
@@ -82,7 +79,7 @@ def effects(
         from rigid_env.lab.measure import effects as costs
         from rigid_env.lab.measure.table import make_table
 
-        chosen = costs.chosen(effect or (), markdown)
+        chosen = costs.chosen(effect or ())
         make_parents(json)
         console = make_console()
         repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
@@ -96,9 +93,6 @@ def effects(
             measured = ([costs.effect_row(name, accuracy, steps, repeats, tick)] for name in chosen)
             is_complete = collect(found, measured)
         console.print(make_table(found, "steps per second", ("with it", "without")))
-        if markdown is not None and is_complete:
-            costs.write_markdown(markdown, found, accuracy)
-            tell_file(markdown, console)
         content = {"is_quick": quick, "is_complete": is_complete, "rows": [row.to_dict() for row in found]}
         write(json, content, console)
     end(is_complete)
