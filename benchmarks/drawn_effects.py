@@ -19,7 +19,7 @@ import typer
 from rich.progress import track
 
 from benchmarks import drawn_worlds
-from rigid_env.lab.measure.machine import describe, write_json
+from rigid_env.lab.measure.machine import write_json
 
 PRESETS = ("fast", "balanced")
 WORLDS_PER_DRAW = 4
@@ -86,7 +86,7 @@ def main(
             place = "floor" if row["floor"] else "flight"
             print(f"{','.join(row['effects'])} {place} {row['preset']} --seed {draw['seed']}: {draw['excess']:.3g}")
         if json:
-            write_json(json, {"rows": rows, "machine": describe()})
+            write_json(json, {"name": "drawn_effects", "rows": rows})
     count, beyond = sum(row["worlds"] for row in rows), sum(len(row["beyond"]) for row in rows)
     told = sum(row["told"] for row in rows)
     print(f"{count} worlds, {beyond} draws beyond the law, {told} worlds with a report that is not OK")

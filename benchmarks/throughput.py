@@ -1,6 +1,6 @@
 """Throughput beside MuJoCo: ``python -m benchmarks.throughput [--quick] [--json FILE]``.
 
-Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B A B); a ratio is
+Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B, B A); a ratio is
 taken turn by turn, and its median is what counts. One run of each is thrown away first. Our numbers are given
 at ``fast`` and ``balanced``. Without MuJoCo our numbers stand alone. The rows of the part ``threads`` compare two
 threads with one, on a quiet machine and beside busy processes.
