@@ -151,7 +151,7 @@ def _keep(path: Path | None, report: Report) -> None:
 
 
 def _jobs(plan: Plan, engines: Sequence[Engine]) -> list[tuple[str, Callable[[], Outcome]]]:
-    """What to run and what to call it: ours case by case, then other engines on cases that look at motion alone.
+    """Names and calls of all runs: ours case by case, then other engines on cases that look at motion alone.
 
     These make the shorter runs: all their settings are tried.
     """
