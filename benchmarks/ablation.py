@@ -1,6 +1,6 @@
 """Worth of each optimisation of the compiler: ``python -m benchmarks.ablation [--repeats N] [--only NAME ...]``.
 
-Each optimisation of `physics.kernels.compile.fused.ablation` is left out, in turns with all on (A B A B). A sample is
+Each optimisation of `physics.kernels.compile.fused.ablation` is left out, in turns with all on (A B, B A). A sample is
 three processes: the first step of `drop` at `balanced` with nothing compiled, that of `drop` without gravity in the
 same folder, and runs of the workloads of `benchmarks.throughput`, whose kernels were compiled before. First steps are
 measured in CPU seconds, as `benchmarks.compile` does. A column is the median of the ratios without over with, turn by
@@ -19,6 +19,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -26,9 +27,10 @@ import typer
 
 from benchmarks import machine
 from benchmarks.compile import first_step
+from benchmarks.processes import PATIENCE
 from physics.kernels.compile.fused.ablation import BASES, OPTIMISATIONS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.processes import PATIENCE
+from rigid_env.lab.measure.timing import interleave
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 SCENE, ACCURACY = "drop", "balanced"
@@ -43,7 +45,8 @@ COLUMNS = {
 
 SPEEDS = """
 import json, sys
-from rigid_env.lab.measure import bodies, workloads
+from benchmarks import bodies
+from rigid_env.lab.measure import workloads
 accuracy, runs = sys.argv[1], int(sys.argv[2])
 sizes = workloads.Sizes(flights=200, rest_steps=400_000, shoves=4000)
 works = {name.lower(): getattr(workloads, name)(accuracy, sizes) for name in ("Flight", "Rest", "Shove")}
@@ -94,17 +97,14 @@ def sample(name: str, kernels: Path) -> dict[str, float]:
 
 def measure(name: str, repeats: int, kernels: Path) -> dict[str, list[dict[str, float]]]:
     """Samples with and without an optimisation, in turns; the workloads of both are compiled before."""
-    found: dict[str, list[dict[str, float]]] = {"with": [], "without": []}
-    folders = {"with": kernels / "all", "without": kernels / name}
-    for turn in range(repeats):
-        for which, samples in found.items():
-            print(f"{name}: {which}, turn {turn + 1} of {repeats}", file=sys.stderr, flush=True)
-            left = name if which == "without" else ""
-            if not folders[which].exists():
-                with left_out(left):
-                    steps_per_second(folders[which])
-            samples.append(sample(left, folders[which]))
-    return found
+    sides = {"with": ("", kernels / "all"), "without": (name, kernels / name)}
+    for left, folder in sides.values():
+        if not folder.exists():
+            with left_out(left):
+                steps_per_second(folder)
+    runs = {which: partial(sample, left, folder) for which, (left, folder) in sides.items()}
+    spreads = interleave(runs, repeats, lambda which: print(f"{name}: {which}", file=sys.stderr), is_warm=True)
+    return {which: list(spread.samples) for which, spread in spreads.items()}
 
 
 def ratio(samples: dict[str, list[dict[str, float]]], column: str) -> float:

@@ -21,7 +21,7 @@ import typer
 
 import physics
 from benchmarks import machine
-from rigid_env.lab.measure.processes import PATIENCE
+from benchmarks.processes import PATIENCE
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 PROGRAM = """

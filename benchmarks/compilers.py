@@ -2,7 +2,7 @@
 
 The first table has the first step of a scene in a process of its own: CPU seconds and memory with nothing kept on disk,
 and CPU seconds of a second process. The second one has steps per second of each compiler, by process in turns (fused,
-numba, fused, numba, ...), and the ratio of `fused` to it, of which the median over the turns counts. Python's row has
+numba, numba, fused, ...), and the ratio of `fused` to it, of which the median over the turns counts. Python's row has
 few steps.
 """
 
@@ -14,6 +14,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -22,9 +23,10 @@ from rich.progress import Progress
 
 import physics
 from benchmarks import machine
+from benchmarks.processes import PATIENCE
 from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, NUMBA, PYTHON, VARIABLE
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.processes import PATIENCE
+from rigid_env.lab.measure.timing import interleave
 from rigid_env.terminal import Column, Table, make_console, number_columns
 
 WORK = ("flight", "rest", "shoved", "stack")
@@ -42,7 +44,8 @@ print(json.dumps({"cpu": cpu, "wall": wall, "memory": resource.getrusage(resourc
 
 RATES = """
 import json, statistics, sys
-from rigid_env.lab.measure import bodies, workloads
+from benchmarks import bodies
+from rigid_env.lab.measure import workloads
 accuracy, names, repeats, is_quick = sys.argv[1], sys.argv[2].split(","), int(sys.argv[3]), sys.argv[4] == "True"
 sizes = workloads.QUICK if is_quick else workloads.FULL
 found = {}
@@ -79,17 +82,15 @@ def first_steps(scene: str, accuracy: str, compiler: str) -> dict[str, float]:
 
 def rates(accuracy: str, work: list[str], turns: int, kernels: Path, tick) -> dict[str, list[dict[str, float]]]:
     """Steps per second of each compiler in each turn; of Python in one, of little work."""
-    found: dict[str, list] = {FUSED: [], NUMBA: [], PYTHON: []}
+    run = partial(_run, RATES)
+    few, full = (kernels, accuracy, ",".join(work), "1", "True"), (kernels, accuracy, ",".join(work), "5", "False")
     for compiler in (FUSED, NUMBA):
         tick(f"{compiler}: compiling")
-        _run(RATES, compiler, kernels, accuracy, ",".join(work), "1", "True")
-    for turn in range(turns):
-        for compiler in (FUSED, NUMBA):
-            tick(f"{compiler}: turn {turn + 1}")
-            found[compiler].append(_run(RATES, compiler, kernels, accuracy, ",".join(work), "5", "False"))
+        run(compiler, *few)
+    runs = {compiler: partial(run, compiler, *full) for compiler in (FUSED, NUMBA)}
+    found = {name: list(of.samples) for name, of in interleave(runs, turns, tick, is_warm=True).items()}
     tick(PYTHON)
-    found[PYTHON].append(_run(RATES, PYTHON, kernels, accuracy, ",".join(work), "1", "True"))
-    return found
+    return {**found, PYTHON: [run(PYTHON, *few)]}
 
 
 def first_table(rows: list[dict], title: str) -> Table:
@@ -158,7 +159,7 @@ def main(
         console.print(first_table(rows, machine.headline()))
     console.print(rate_table(medians, accuracy, machine.headline()))
     if json is not None:
-        about = {"name": "compilers", "machine": machine.headline(), "turns": turns, "accuracy": accuracy}
+        about = {"name": "compilers", "turns": turns, "accuracy": accuracy}
         write_json(json, {**about, "first steps": rows, "rates": medians})
 
 

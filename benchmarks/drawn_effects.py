@@ -1,7 +1,7 @@
 """Energy of worlds with drawn effects: ``python -m benchmarks.drawn_effects``.
 
 Every effect of the catalogue and every two, in flight and on a floor, at `fast` and `balanced`: see
-`rigid_env.lab.measure.drawn_effects` for what is drawn and for the law. Draws that break it are listed with what makes
+`benchmarks.drawn_worlds` for what is drawn and for the law. Draws that break it are listed with what makes
 them again: ``--pair "spring,drag" --seed 17``. A file of results grows by seeds that are not in it yet: ``--seed 20``.
 """
 
@@ -18,19 +18,19 @@ import numpy as np
 import typer
 from rich.progress import track
 
-from rigid_env.lab.measure import drawn_effects
-from rigid_env.lab.measure.machine import describe, write_json
+from benchmarks import drawn_worlds
+from rigid_env.lab.measure.machine import write_json
 
 PRESETS = ("fast", "balanced")
 WORLDS_PER_DRAW = 4
 
 
-def one(names: tuple[str, ...], on_floor: bool, preset: str, seed: int) -> drawn_effects.Outcome | None:
+def one(names: tuple[str, ...], on_floor: bool, preset: str, seed: int) -> drawn_worlds.Outcome | None:
     """One draw; None where its effects cannot be had together."""
     rng = np.random.default_rng([zlib.crc32("+".join(names).encode()), on_floor, seed])
     try:
-        scene = drawn_effects.draw_scene(rng, names, on_floor)
-        return None if scene is None else drawn_effects.run(rng, scene, preset, WORLDS_PER_DRAW)
+        scene = drawn_worlds.draw_scene(rng, names, on_floor)
+        return None if scene is None else drawn_worlds.run(rng, scene, preset, WORLDS_PER_DRAW)
     except ValueError as error:
         if "allowed" not in str(error):  # as every refusal of two effects together says
             raise
@@ -55,11 +55,11 @@ def run_kind(names: tuple[str, ...], on_floor: bool, preset: str, seeds: range) 
 
 def kinds(pair: str, presets: tuple[str, ...]) -> list[tuple[tuple[str, ...], bool, str]]:
     """(effects, on a floor, preset) of all kinds of draws."""
-    chosen = [tuple(pair.split(","))] if pair else drawn_effects.pairs()
+    chosen = [tuple(pair.split(","))] if pair else drawn_worlds.pairs()
     return [
         (names, on_floor, preset)
         for names, on_floor, preset in itertools.product(chosen, (False, True), presets)
-        if on_floor or not any(name in drawn_effects.ON_FLOOR for name in names)
+        if on_floor or not any(name in drawn_worlds.ON_FLOOR for name in names)
     ]
 
 
@@ -86,7 +86,7 @@ def main(
             place = "floor" if row["floor"] else "flight"
             print(f"{','.join(row['effects'])} {place} {row['preset']} --seed {draw['seed']}: {draw['excess']:.3g}")
         if json:
-            write_json(json, {"rows": rows, "machine": describe()})
+            write_json(json, {"name": "drawn_effects", "rows": rows})
     count, beyond = sum(row["worlds"] for row in rows), sum(len(row["beyond"]) for row in rows)
     told = sum(row["told"] for row in rows)
     print(f"{count} worlds, {beyond} draws beyond the law, {told} worlds with a report that is not OK")

@@ -12,7 +12,6 @@ its solvers. With ``--json`` the result is written after each layer.
 
 from __future__ import annotations
 
-import json as json_of
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -22,12 +21,12 @@ import numpy as np
 import typer
 
 import physics
-from benchmarks import machine
 from benchmarks.piles import OURS, SOLVERS, exponent
 from benchmarks.settling import Ours, Sample, Theirs, Watch
 from physics import scenes
 from rigid_env.lab.measure import mujoco_scene
-from rigid_env.lab.measure.plotting import require_matplotlib
+from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.plotting import make_figure
 
 LAYERS, QUICK_LAYERS = 32, 2
 PEER_LAYERS = (4, 8, 16)  # MuJoCo takes a minute for the last one
@@ -90,20 +89,15 @@ def _note(name: str, sample: Sample, found: dict[str, list[Sample]]) -> None:
     typer.echo(line)
 
 
-def to_json(found: dict[str, list[Sample]], accuracy: str) -> str:
-    """All that was found so far."""
+def to_dict(found: dict[str, list[Sample]], accuracy: str) -> dict:
+    """All that was found so far, for JSON."""
     series = {name: {"exponent": fit(s), "samples": [asdict(one) for one in s]} for name, s in found.items()}
-    return json_of.dumps({"machine": machine.headline(), "accuracy": accuracy, "from_layer": DEEP, **series}, indent=1)
+    return {"name": "growing", "accuracy": accuracy, "from_layer": DEEP, **series}
 
 
 def draw(path: Path, found: dict[str, list[Sample]]) -> None:
     """Time of a step against its contacts, logarithmic, and what would be linear."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.5, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = make_figure(6.5, 4.5)
     panel = figure.subplots()
     for color, (name, samples) in zip(("#0072b2", "#d55e00", "#cc79a7"), found.items()):
         slope = fit(samples)
@@ -140,7 +134,7 @@ def main(
             for solver in SOLVERS if count // (WIDTH * WIDTH) in peer_layers else ():
                 _note(f"MuJoCo, {solver}", measure(count, Theirs(scene, solver), parts), found)
             if json is not None:
-                json.write_text(to_json(found, accuracy) + "\n")
+                write_json(json, to_dict(found, accuracy))
     if plot is not None:
         draw(plot, found)
     for name, samples in found.items():

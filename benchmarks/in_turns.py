@@ -8,22 +8,27 @@ this checkout is 5 % faster. Where roundings decide what happens, two commits ta
 
 from __future__ import annotations
 
-import statistics
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.progress import track
 
 from benchmarks import machine
 from benchmarks.same_bits import Checkout
 from benchmarks.turn_worker import ENVIRONMENT
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.table import make_table
+from rigid_env.lab.measure.timing import Row, interleave
+from rigid_env.terminal import make_console
 
 WORKER = Path(__file__).with_name("turn_worker.py")
 SCENES = (
     "tumble", "drop", "shoved", "elastic", "grain", "kick", "floats", "spring", "tower", "mixed", "mixed-drawn",
     "sleeping-tower",
 )  # fmt: skip
+HERE, THERE = "this checkout", "the other checkout"
 SAMPLE_SECONDS = 0.3  # CPU time of a sample, at least
 
 
@@ -41,33 +46,32 @@ def steps_of(side: Checkout, name: str) -> int:
     return count
 
 
-def compare(here: Checkout, there: Checkout, name: str, turns: int) -> list[float]:
-    """CPU time there over CPU time here, of each turn; who begins changes."""
-    count, ratios = steps_of(here, name), []
-    seconds(there, name, count)
-    for turn in range(turns):
-        pair = (here, there) if turn % 2 == 0 else (there, here)
-        spent = {side: seconds(side, name, count) for side in pair}
-        ratios.append(spent[there] / spent[here])
-    return ratios
+def compare(here: Checkout, there: Checkout, name: str, turns: int) -> Row:
+    """Steps per second of CPU time here and there, in turns: their ratio is CPU time there over CPU time here."""
+    count = steps_of(here, name)
+
+    def rate(side: Checkout) -> float:
+        return count / seconds(side, name, count)
+
+    spreads = interleave({HERE: partial(rate, here), THERE: partial(rate, there)}, turns)
+    return Row(name, name, "steps/CPU s", spreads[HERE], peer_name=THERE, peer=spreads[THERE])
 
 
 def main(
     other: Annotated[Path, typer.Argument(help="A checkout of the commit to compare with.", exists=True)],
     turns: Annotated[int, typer.Option(min=1, help="Samples of each.")] = 11,
     scene: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join((*SCENES, ENVIRONMENT))}.")] = None,
-    json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
+    json: Annotated[Path | None, typer.Option(help="File for the result, kept as it grows.")] = None,
 ) -> None:
-    """Print the median ratio of each scene; keep all samples."""
-    found = {}
+    """Print the ratio of each scene, median and range; keep all samples."""
+    rows = []
     mine = Path(__file__).parents[1]
     with Checkout(mine, worker=WORKER) as here, Checkout(other.resolve(), worker=WORKER) as there:
-        for name in scene or (*SCENES, ENVIRONMENT):
-            found[name] = compare(here, there, name, turns)
-            low, high = min(found[name]), max(found[name])
-            typer.echo(f"{name:16} {statistics.median(found[name]):6.3f}   {low:.3f} to {high:.3f}")
-    if json is not None:
-        write_json(json, {"name": "in_turns", "machine": machine.headline(), "ratios": found})
+        for name in track(scene or (*SCENES, ENVIRONMENT), description="scenes"):
+            rows.append(compare(here, there, name, turns))
+            if json is not None:
+                write_json(json, {"name": "in_turns", "ratios": {row.key: row.ratio.samples for row in rows}})
+    make_console().print(make_table(rows, machine.headline(), (HERE, THERE)))
 
 
 if __name__ == "__main__":

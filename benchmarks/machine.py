@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from rigid_env.lab.measure.machine import describe, write_json
@@ -17,9 +18,21 @@ def keep(name: str, rows: list[Row], path: Path | None = None, **settings) -> Pa
     return path
 
 
-def headline() -> str:
-    """One line on the machine and the commit, to print over a table."""
-    found = describe()
+def headline(found: dict | None = None) -> str:
+    """One line on a machine and a commit, to print over a table; by default those of this process.
+
+    Parameters
+    ----------
+    found : dict, optional
+        The ``machine`` of a result.
+    """
+    found = found or describe()
     git = found["git"]
     commit = "no commit" if git is None else git["commit"][:10] + (" + changes" if git["is_dirty"] else "")
     return f"{found['processor']}, {found['cores']} cores, Python {found['python']}, {commit}, {found['date']}"
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence]) -> str:
+    """A table of a page; bars in cells are escaped."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(str(cell).replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -1,14 +1,14 @@
 """BlockReach with NumPy functions in place of the compiled one: what a task written by a user costs.
 
-``python -m benchmarks.numpy_reach [--turns N] [--json FILE]`` measures both in turns: a step of 1,024 worlds on one
-thread, in ns per world, and steps per second of one environment.
+``python -m benchmarks.numpy_reach [--turns N] [--json FILE]`` measures both in turns: steps per second of one
+environment, and of 1,024 worlds on one thread, counted world by world.
 """
 
 from __future__ import annotations
 
-import statistics
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from time import perf_counter
 from typing import Annotated
 
 import numpy as np
@@ -17,10 +17,11 @@ import typer
 from benchmarks import machine
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.table import make_table
+from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
 from rigid_env.tasks import BlockReach, Entry, kernels, observe
 from rigid_env.tasks.block_draws import OnFloor
-from rigid_env.terminal import Column, Table, make_console, number_columns
+from rigid_env.terminal import make_console
 
 WORLDS = 1024
 
@@ -95,16 +96,16 @@ class NumpyReach(BlockReach):
         }
 
 
-def ns_per_world(task: type[BlockReach], steps: int, actions: np.ndarray) -> float:
-    """Time of a step of `WORLDS` worlds, per world [ns]."""
+def batches_per_second(task: type[BlockReach], steps: int, actions: np.ndarray) -> float:
+    """Steps per second of `WORLDS` worlds at once."""
     envs = RigidVectorEnv(task(WORLDS))
     envs.reset(seed=0)
     for k in range(3):
         envs.step(actions[k])
-    start = perf_counter()
-    for k in range(steps):
-        envs.step(actions[k % len(actions)])
-    return (perf_counter() - start) / steps / WORLDS * 1e9
+    with Stopwatch() as watch:
+        for k in range(steps):
+            envs.step(actions[k % len(actions)])
+    return steps / watch.seconds
 
 
 def steps_per_second(task: type[BlockReach], steps: int, actions: np.ndarray) -> float:
@@ -112,10 +113,10 @@ def steps_per_second(task: type[BlockReach], steps: int, actions: np.ndarray) ->
     env = RigidEnv(task(1))
     env.reset(seed=0)
     env.step(actions[0, 0])
-    start = perf_counter()
-    for k in range(steps):
-        env.step(actions[k % len(actions), k % WORLDS])
-    return steps / (perf_counter() - start)
+    with Stopwatch() as watch:
+        for k in range(steps):
+            env.step(actions[k % len(actions), k % WORLDS])
+    return steps / watch.seconds
 
 
 def main(
@@ -124,21 +125,20 @@ def main(
 ) -> None:
     """Measure BlockReach compiled and in NumPy, in turns."""
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (16, WORLDS, 6)).astype(np.float32)
-    rows = []
-    for _ in range(turns):
-        for task in (BlockReach, NumpyReach):
-            batch, one = ns_per_world(task, 100, actions), steps_per_second(task, 5000, actions)
-            rows.append({"task": task.__name__, "ns per world": batch, "steps per second": one})
-    ours, theirs = rows[::2], rows[1::2]
-    ratio = statistics.median(b["ns per world"] / a["ns per world"] for a, b in zip(ours, theirs))
-    table = Table([Column("task"), *number_columns("ns per world and step", "steps/s of one")], machine.headline(),
-                  f"NumPy takes {ratio:.2f} times as long in a batch of {WORLDS}")  # fmt: skip
-    for name, of in (("compiled", ours), ("NumPy", theirs)):
-        medians = [statistics.median(row[key] for row in of) for key in ("ns per world", "steps per second")]
-        table.add_row(name, f"{medians[0]:,.0f}", f"{medians[1]:,.0f}")
-    make_console().print(table)
+    rows = [
+        _row("one_env", "one environment", turns, lambda task: steps_per_second(task, 5000, actions)),
+        _row("batch", f"{WORLDS:,} worlds", turns, lambda task: WORLDS * batches_per_second(task, 100, actions)),
+    ]
+    make_console().print(make_table(rows, machine.headline(), ("compiled", "NumPy")))
     if json is not None:
-        write_json(json, {"name": "numpy_reach", "machine": machine.headline(), "ratio": ratio, "rows": rows})
+        machine.keep("numpy_reach", rows, json, turns=turns)
+
+
+def _row(key: str, what: str, turns: int, rate: Callable[[type[BlockReach]], float]) -> Row:
+    """The compiled task and that in NumPy, in turns."""
+    tasks = {"compiled": BlockReach, "NumPy": NumpyReach}
+    spreads = interleave({name: partial(rate, task) for name, task in tasks.items()}, turns)
+    return Row(key, what, "env steps/s", spreads["compiled"], peer_name="NumPy", peer=spreads["NumPy"])
 
 
 if __name__ == "__main__":

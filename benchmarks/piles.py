@@ -9,7 +9,6 @@ after each pile.
 
 from __future__ import annotations
 
-import json as json_of
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -19,13 +18,13 @@ import numpy as np
 import typer
 
 import physics
-from benchmarks import machine
 from benchmarks.settling import PARTS, Ours, Sample, Theirs, settle
 from physics import scenes
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from rigid_env.lab.measure import mujoco_scene
-from rigid_env.lab.measure.plotting import require_matplotlib
+from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.plotting import make_figure
 from rigid_env.lab.measure.workloads import STEP
 
 PILES, QUICK_PILES = (25, 50, 100, 200, 400), (5, 10)
@@ -87,12 +86,7 @@ def _note(name: str, falling: Sample, lying: Sample, found: dict[str, Series]) -
 
 def draw(path: Path, found: dict[str, Series], spreads: list[Sample]) -> None:
     """Time against what is found, side by side, logarithmic: piles that lie, that fall, and the broad phase."""
-    require_matplotlib()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(15.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = make_figure(15.0, 4.0)
     panels = (
         ("a step of a pile that lies", "contacts", {name: series["piles"] for name, series in found.items()}),
         ("a step while it falls and settles", "contacts", {name: series["falling"] for name, series in found.items()}),
@@ -116,16 +110,15 @@ def _draw_samples(panel, name: str, samples: list[Sample], color: str) -> None:
         panel.annotate(f"{sample.bodies} bodies", (sample.found, t), textcoords="offset points", xytext=(6, -10))
 
 
-def to_json(found: dict[str, Series], spreads: list[Sample], accuracy: str) -> str:
-    """All that was found so far; exponents of what has two sizes."""
+def to_dict(found: dict[str, Series], spreads: list[Sample], accuracy: str) -> dict:
+    """All that was found so far, for JSON; exponents where there are two sizes."""
     kept = {name: dict(series) for name, series in found.items()}
     kept[OURS]["broad_phase"] = spreads
     for series in kept.values():
         exponents = {kind: exponent(samples) for kind, samples in series.items() if len(samples) > 1}
         series.update({kind: [asdict(s) for s in samples] for kind, samples in series.items()}, exponents=exponents)
     ours, peers = kept.pop(OURS), kept
-    result = {"machine": machine.headline(), "accuracy": accuracy, **ours}
-    return json_of.dumps(result | ({"peers": peers} if peers else {}), indent=1) + "\n"
+    return {"name": "piles", "accuracy": accuracy, **ours, **({"peers": peers} if peers else {})}
 
 
 def main(
@@ -143,7 +136,7 @@ def main(
 
     def keep() -> None:
         if json is not None:
-            json.write_text(to_json(found, spreads, accuracy))
+            write_json(json, to_dict(found, spreads, accuracy))
 
     with mujoco_scene.elsewhere():
         for count in QUICK_PILES if quick else PILES:

@@ -14,11 +14,11 @@ import numpy as np
 from agents.planner import Planner, PlannerSettings
 from benchmarks import planning_worker
 from benchmarks.planning_worker import NUMBERS, Setup
+from benchmarks.processes import PATIENCE, killed_after, wait_for_end
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
 from physics.world.snapshot import KEPT
 from rigid_env.lab.measure.mujoco_scene import model_xml
-from rigid_env.lab.measure.processes import PATIENCE, killed_after, wait_for_end
 from rigid_env.lab.measure.timing import Stopwatch
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col

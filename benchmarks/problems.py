@@ -12,7 +12,7 @@ from physics import scenes
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, BodiesWorkspace
 from physics.kernels.state import layout as at
-from rigid_env.lab.hard_cases.cases import arch, stacks
+from rigid_env.hard_cases.cases import arch, stacks
 
 SETTINGS = {"relative_slop": 1e-6, "tolerance": 1e-6, "sweeps": 200, "splits": 8, "rest_share": 0.5}
 STEP = 0.01  # of the worlds whose first problem is taken [s]

@@ -21,11 +21,10 @@ import numpy as np
 import typer
 from rich.progress import track
 
-from benchmarks import machine
 from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
+from benchmarks.processes import ENDING, PATIENCE, killed_after, wait_for_end
 from physics.kernels.compile.compiler_choice import COMPILERS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.processes import ENDING, PATIENCE, killed_after, wait_for_end
 
 WORKER = Path(__file__).with_name("bit_scenes.py")
 
@@ -110,7 +109,7 @@ def main(
     typer.echo(f"{len(found) - len(different)} of {len(found)} runs of {steps} steps have the same bits")
     if json is not None:
         write_json(json, {
-            "name": "same_bits", "machine": machine.headline(), "steps": steps,
+            "name": "same_bits", "steps": steps,
             "compilers": [compiler, other_compiler], "runs": found,
         })  # fmt: skip
     raise typer.Exit(1 if different else 0)

@@ -10,7 +10,7 @@ import physics
 from physics.io.recording import Recording, Start
 from physics.world.snapshot import KEPT
 from physics.world.world import Snapshot
-from rigid_env.lab.hard_cases.cases.random_scenes import Outcome, gain_limit, look, push
+from rigid_env.hard_cases.cases.random_scenes import Outcome, gain_limit, look, push
 
 
 def law_broken(recording: Recording) -> str:

@@ -1,6 +1,6 @@
 """Look for failures as long as one likes: ``python -m benchmarks.soak --minutes 5 --seed 0 --keep DIR [--env ID]``.
 
-Without ``--env``: random scenes, parameters, states and wrenches (`rigid_env.lab.hard_cases.cases.random_scenes`), held
+Without ``--env``: random scenes, parameters, states and wrenches (`rigid_env.hard_cases.cases.random_scenes`), held
 against its laws. With it: an agent that pushes with all its strength, at random and for long into the walls, at every
 accuracy; states stay finite and inside, rewards and successes are computed anew from the states. Each failure is kept,
 shrunk, as a recording for ``rigid-env replay``. Ctrl-C ends it early; what was found is written all the same.
@@ -20,7 +20,7 @@ from rich.progress import Progress
 import physics
 from benchmarks import machine, soak_env
 from benchmarks.shrink import shrink
-from rigid_env.lab.hard_cases.cases import random_scenes
+from rigid_env.hard_cases.cases import random_scenes
 from rigid_env.lab.measure.machine import write_json
 
 BATCH = 200

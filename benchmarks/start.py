@@ -7,11 +7,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
 import physics
-from rigid_env.lab.measure.processes import PATIENCE
-from rigid_env.lab.measure.timing import Row, Spread
+from benchmarks.processes import PATIENCE
+from rigid_env.lab.measure.timing import Row, interleave
 
 LIMIT = 1.5  # [s]
 
@@ -29,15 +30,14 @@ PROGRAMS = {
 
 
 def start_rows(repeats: int, accuracies=("fast", "balanced")) -> list[Row]:
-    """One row per program and accuracy; each runs once more before, to fill the cache."""
-    rows = []
-    for key, (what, program) in PROGRAMS.items():
-        for accuracy in accuracies:
-            code = program.format(accuracy=accuracy)
-            samples = [_seconds(code) for _ in range(repeats + 1)][1:]
-            spread = Spread(tuple(samples))
-            rows.append(Row(key, what, "s", spread, accuracy=accuracy, target=LIMIT, is_ratio=False))
-    return rows
+    """One row per program and accuracy, in turns; each runs once more before, to fill the cache."""
+    programs = {(key, accuracy): program.format(accuracy=accuracy)
+                for key, (_, program) in PROGRAMS.items() for accuracy in accuracies}  # fmt: skip
+    spreads = interleave({name: partial(_seconds, code) for name, code in programs.items()}, repeats)
+    return [
+        Row(key, PROGRAMS[key][0], "s", spread, accuracy=accuracy, target=LIMIT, is_ratio=False)
+        for (key, accuracy), spread in spreads.items()
+    ]
 
 
 def _seconds(code: str) -> float:

@@ -1,6 +1,6 @@
 """Throughput beside MuJoCo: ``python -m benchmarks.throughput [--quick] [--json FILE]``.
 
-Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B A B); a ratio is
+Both engines take steps of 5 ms in the same scenes, in the same process and in turns (A B, B A); a ratio is
 taken turn by turn, and its median is what counts. One run of each is thrown away first. Our numbers are given
 at ``fast`` and ``balanced``. Without MuJoCo our numbers stand alone. The rows of the part ``threads`` compare two
 threads with one, on a quiet machine and beside busy processes.
@@ -14,8 +14,8 @@ from typing import Annotated
 import typer
 from rich.progress import Progress
 
-from benchmarks import machine, memory, start
-from rigid_env.lab.measure import bodies, crowded, environments, mujoco_scene, rows, workloads
+from benchmarks import bodies, crowded, machine, memory, start
+from rigid_env.lab.measure import environments, mujoco_scene, rows, workloads
 from rigid_env.lab.measure.table import make_table
 from rigid_env.lab.measure.timing import Row
 from rigid_env.terminal import make_console

@@ -26,9 +26,9 @@ import numpy as np
 import typer
 
 from benchmarks import machine
-from rigid_env.lab.measure.processes import killed_after, wait_for_end
+from benchmarks.processes import killed_after, wait_for_end
 from rigid_env.lab.measure.table import make_table
-from rigid_env.lab.measure.timing import Row, Spread
+from rigid_env.lab.measure.timing import Row, Spread, interleave
 from rigid_env.rendering import BodyView, Frame, WallView
 from rigid_env.terminal import make_console
 from rigid_env.viewer.export import page_of
@@ -183,14 +183,16 @@ def measure_first_picture(is_quick: bool) -> list[Row]:
         return []
     view = [sys.executable, "-c", "from rigid_env.cli import app; app()", "view", "drop"]
     ways = {"first": partial(time_to_picture, command=view), "empty": time_of_empty_page}
-    times: dict[str, list[float]] = {name: [] for name in ways}
     with browser() as opened:
-        for _ in range(1 + (1 if is_quick else REPEATS)):
-            for name, way in ways.items():
-                page = opened.new_page(viewport=SIZE)
-                times[name].append(way(page))
-                page.close()
-    first, empty = (Spread(tuple(values[1:])) for values in times.values())  # the first of each warms what it uses
+
+        def run(way) -> float:
+            page = opened.new_page(viewport=SIZE)
+            seconds = way(page)
+            page.close()
+            return seconds
+
+        times = interleave({name: partial(run, way) for name, way in ways.items()}, 1 if is_quick else REPEATS)
+    first, empty = times["first"], times["empty"]
     return [
         Row("first_picture", "`rigid-env view drop` to its first picture", "s", first, target=FIRST, is_ratio=False),
         Row("empty_page", "an empty page of viser to its first picture", "s", empty, target=None, is_ratio=False),

@@ -6,6 +6,7 @@ No test asserts a time.
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -55,22 +56,34 @@ def test_targets(case, is_passed):
     assert case.to_dict()["pass"] is is_passed
 
 
+def contestants(names: str, order: list) -> dict:
+    """Contestants that note in `order` that they ran, and measure how many did so far."""
+
+    def run(name):
+        order.append(name)
+        return float(len(order))
+
+    return {name: partial(run, name) for name in names}
+
+
 def test_contestants_run_in_turns_and_the_first_turn_is_thrown_away():
+    order, told = [], []
+    spreads = interleave(contestants("ab", order), 2, told.append)
+    assert "".join(order) == "".join(told) == "ababba"  # who begins changes
+    assert spreads["a"].samples == (3.0, 6.0)
+    assert spreads["b"].samples == (4.0, 5.0)
+    assert (spreads["a"] / spreads["b"]).samples == (0.75, 1.2)
+
+
+def test_contestants_that_are_warm_count_from_their_first_run():
     order = []
+    spreads = interleave(contestants("abc", order), 3, is_warm=True)
+    assert "".join(order) == "abccbaabc"
+    assert spreads["b"].samples == (2.0, 5.0, 8.0)
 
-    def contestant(name):
-        def run():
-            order.append(name)
-            return float(len(order))
 
-        return run
-
-    told = []
-    spreads = interleave({"a": contestant("a"), "b": contestant("b")}, 2, told.append)
-    assert "".join(order) == "".join(told) == "ababab"
-    assert spreads["a"].samples == (3.0, 5.0)
-    assert spreads["b"].samples == (4.0, 6.0)
-    assert fastest(spreads, ["a", "b"]) == "b"
+def test_the_fastest_has_the_highest_median():
+    assert fastest({"a": Spread((1.0, 9.0, 2.0)), "b": Spread((3.0, 3.0, 3.0))}, ["a", "b"]) == "b"
 
 
 def test_table_shows_numbers_in_three_digits():
@@ -86,6 +99,7 @@ def test_table_shows_numbers_in_three_digits():
     assert text[4].startswith("25\n")
     assert text[5] == "≥ 25"
     assert "yes" in text[6]
+    assert cells(row((1.0063,), (1.0,)))[4].plain == "1.006"  # a ratio in four
     assert make_table([row((1.0,))], "title").row_count == 1
 
 

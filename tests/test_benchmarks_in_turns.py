@@ -23,7 +23,7 @@ class Side:
 def test_a_ratio_is_the_time_there_over_the_time_here_and_who_begins_changes():
     asked = []
     here, there = Side("here", 1e-4, asked), Side("there", 2e-4, asked)
-    assert in_turns.compare(here, there, "drop", 3) == pytest.approx([2.0] * 3)
+    assert in_turns.compare(here, there, "drop", 3).ratio.samples == pytest.approx([2.0] * 3)
     assert [name for name, _ in asked[-6:]] == ["here", "there", "there", "here", "here", "there"]
     assert len({count for _, count in asked[-6:]}) == 1
     assert asked[-1][1] * here.step_seconds >= in_turns.SAMPLE_SECONDS

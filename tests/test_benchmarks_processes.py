@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.processes import killed_after, wait_for_end
 from benchmarks.same_bits import Checkout
-from rigid_env.lab.measure.processes import killed_after, wait_for_end
 
 ROOT = Path(__file__).parents[1]
 KILLED = -9

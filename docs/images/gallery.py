@@ -16,8 +16,8 @@ from PIL import Image
 
 import physics
 import rigid_env  # noqa: F401 (registers the environments)
-from rigid_env.lab.hard_cases.case import Setting
-from rigid_env.lab.hard_cases.registry import find
+from rigid_env.hard_cases.case import Setting
+from rigid_env.hard_cases.registry import find
 from rigid_env.rendering import BodyView, Camera, Frame, Renderer, fit_camera
 from rigid_env.rendering.picture import stroboscope, without_bodies, world_frame
 from rigid_env.rendering.staging import Stage

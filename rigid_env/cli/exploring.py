@@ -182,10 +182,10 @@ def explain(
         from dataclasses import asdict
 
         from physics import make_plan
-        from physics.plan import accuracy as knobs
+        from physics.accuracy import resolve
         from rigid_env.lab.plan_report import make_table
 
-        settings = knobs.resolve(accuracy)
+        settings = resolve(accuracy)
         _, built = names.load_scene(scene)
         make_parents(json)
         console = make_console()

@@ -72,9 +72,6 @@ def effects(
     ] = None,
     accuracy: Accuracy = "balanced",
     json: Json = None,
-    markdown: Annotated[
-        Path | None, output_option("--markdown", ".md", help="Put the table into this page, too.")
-    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
 ) -> None:
     """Measure what each effect costs: steps per second of its scene with it and without."""
@@ -82,7 +79,7 @@ def effects(
         from rigid_env.lab.measure import effects as costs
         from rigid_env.lab.measure.table import make_table
 
-        chosen = costs.chosen(effect or (), markdown)
+        chosen = costs.chosen(effect or ())
         make_parents(json)
         console = make_console()
         repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
@@ -96,9 +93,6 @@ def effects(
             measured = ([costs.effect_row(name, accuracy, steps, repeats, tick)] for name in chosen)
             is_complete = collect(found, measured)
         console.print(make_table(found, "steps per second", ("with it", "without")))
-        if markdown is not None and is_complete:
-            costs.write_markdown(markdown, found, accuracy)
-            tell_file(markdown, console)
         content = {"is_quick": quick, "is_complete": is_complete, "rows": [row.to_dict() for row in found]}
         write(json, content, console)
     end(is_complete)
@@ -202,20 +196,23 @@ def hard_cases(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, with limits for them.")] = False,
     json: Json = None,
     plot: Plot = None,
-    markdown: Annotated[
-        Path | None, output_option("--markdown", ".md", help="Write a page such as docs/hard-cases.md.")
-    ] = None,
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
-        from rigid_env.lab.hard_cases.command import run as run_them
+        from rigid_env.hard_cases import registry
+        from rigid_env.lab.hard_cases.picture import write_picture
+        from rigid_env.lab.hard_cases.report import make_plan, run_and_show
 
         console = make_console()
         plot, lacking = drawable(plot, console)
-        files = (json, plot, markdown)
-        report, written = run_them(console, cases or (), accuracy, dt, steps, peers, quick, *files)
-        for path in written:
-            tell_file(path, console)
+        plan = make_plan(registry.find(cases or ()), accuracy, dt, steps, not quick, peers)
+        make_parents(json, plot)
+        report = run_and_show(console, plan, json)
+        if json:
+            tell_file(json, console)
+        if plot:
+            write_picture(plot, report)
+            tell_file(plot, console)
     end(report.is_complete, lacking)
     if report.has_failed:
         raise typer.Exit(1)

@@ -97,7 +97,7 @@ def complete_effect(incomplete: str) -> list[str]:
 
 def complete_case(incomplete: str) -> list[str]:
     """Names of hard cases."""
-    from rigid_env.lab.hard_cases import registry
+    from rigid_env.hard_cases import registry
 
     return _starting(incomplete, (case.name for case in registry.CASES))
 

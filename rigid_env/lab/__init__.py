@@ -1,1 +1,1 @@
-"""Instruments: benchmarks, hard cases, measured tosses, demonstrations."""
+"""Instruments that users run: speed, accuracy, hard cases, measured tosses, demonstrations, replays."""

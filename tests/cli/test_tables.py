@@ -12,11 +12,11 @@ import physics
 from benchmarks import compile as compiling
 from benchmarks import solvers
 from physics import Frontier, FrontierPoint, scenes
+from rigid_env.hard_cases import registry
+from rigid_env.hard_cases.case import Check
 from rigid_env.lab import plan_report, replaying
 from rigid_env.lab.demo_report import event_table, show
-from rigid_env.lab.hard_cases import registry
 from rigid_env.lab.hard_cases import show as cases
-from rigid_env.lab.hard_cases.case import Check
 from rigid_env.lab.hard_cases.run import Outcome, Status
 from rigid_env.lab.measure import accuracy_table, effects, rows, shares
 from rigid_env.lab.measure.accuracy import Found, Job

@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 from rich.text import Text
 
-from rigid_env.lab.measure.processes import killed_after
+from benchmarks.processes import killed_after
 from rigid_env.terminal import Column, Table, make_console, number_columns, say
 
 WIDTHS = (40, 60, 80, 120)

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -346,28 +345,6 @@ def test_effects_measures_a_scene_with_an_effect_and_without(tmp_path, monkeypat
         assert row["notes"]["added_bytes_per_body"] == 0
 
 
-def test_effects_writes_its_table_into_a_page(tmp_path, monkeypatch):
-    page = tmp_path / "page.md"
-    begin, end = costs.BEGIN, costs.END
-    page.write_text(f"before\n{begin}\nold\n{end}\nafter\n")
-    monkeypatch.setattr(costs, "CASES", {"gravity": costs.CASES["gravity"]})
-    run("effects", "--quick", "--markdown", page)
-    text = page.read_text()
-    assert text.startswith(f"before\n{begin}\n")
-    assert text.endswith(f"{end}\nafter\n")
-    assert "old" not in text
-    assert "| gravity |" in text
-    page.write_text("no such lines")
-    with pytest.raises(ValueError, match="allowed are pages with the lines"):
-        costs.write_markdown(page, [], "balanced")
-    assert costs.BEGIN in (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
-
-
-def test_effects_says_what_it_cannot_do_before_it_measures(tmp_path):
+def test_effects_says_what_it_cannot_do_before_it_measures():
     assert "'best'" in run("effects", "--accuracy", "best", code=2)
     assert "spin friction" in run("effects", "levitation", "--quick", code=2)
-    page = tmp_path / "page.md"
-    page.write_text(f"{costs.BEGIN}\nkept\n{costs.END}\n")
-    output = " ".join(run("effects", "gravity", "--markdown", page, code=2).replace("│", " ").split())
-    assert "written for all effects" in output
-    assert "kept" in page.read_text()

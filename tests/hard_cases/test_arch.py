@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize_scalar, root_scalar
 
 import physics
-from rigid_env.lab.hard_cases.cases.arch import NEAR, arch, joints, least_thickness, missing_force
+from rigid_env.hard_cases.cases.arch import NEAR, arch, joints, least_thickness, missing_force
 
 
 def continuous_limit() -> float:

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from rigid_env.lab.hard_cases import registry
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, UnsupportedError, at_least, none_of, within
+from rigid_env.hard_cases import registry
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError, at_least, none_of, within
 from rigid_env.lab.hard_cases.run import Status, run_case
 from tests.hard_cases import tier
 

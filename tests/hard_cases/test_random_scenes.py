@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.lab.hard_cases.cases import random_scenes
+from rigid_env.hard_cases.cases import random_scenes
 
 # Family, worlds, seed, accuracy: before resting stages, places put right and failed solves were kept from giving energy
 # (decision 14), 1, 3 and 2 worlds of ellipsoids broke a law in these, 5, 7 and 5 of several bodies, and 2, 1 and 1 of

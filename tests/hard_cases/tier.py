@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import pytest
 
-from rigid_env.lab.hard_cases import registry
-from rigid_env.lab.hard_cases.case import Case, Setting, UnsupportedError
+from rigid_env.hard_cases import registry
+from rigid_env.hard_cases.case import Case, Setting, UnsupportedError
 
 DT = 0.01
 

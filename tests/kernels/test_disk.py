@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.processes import killed_after
 from physics.kernels.compile import cache_folder
 from physics.kernels.compile.fused import cache_files
-from rigid_env.lab.measure.processes import killed_after
 from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from rigid_env.lab.hard_cases.case import Setting
-from rigid_env.lab.hard_cases.cases.flight import parabola
+from rigid_env.hard_cases.case import Setting
+from rigid_env.hard_cases.cases.flight import parabola
 from tests.reference import rigid_body as ref
 
 pytestmark = pytest.mark.interpreted

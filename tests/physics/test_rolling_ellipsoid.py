@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 import physics
-from rigid_env.lab.hard_cases.cases.rolling import Ellipse
-from rigid_env.lab.hard_cases.cases.scenery import on_floor
+from rigid_env.hard_cases.cases.rolling import Ellipse
+from rigid_env.hard_cases.cases.scenery import on_floor
 from tests.reference import ellipsoid_on_floor as truth
 
 pytestmark = pytest.mark.interpreted

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 import physics
 from physics import scenes
 from physics.accuracy import resolve
-from rigid_env.lab.hard_cases import registry
-from rigid_env.lab.hard_cases.case import Setting
+from rigid_env.hard_cases import registry
+from rigid_env.hard_cases.case import Setting
 from tests.tiers.sweep import sweep
 
 # Marked `compiled` are long runs of the block of `worlds()`, whose kernels one of them needs anyway.

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import physics
+from benchmarks import drawn_worlds
 from benchmarks.drawn_effects import one
-from rigid_env.lab.measure import drawn_effects
 from tests.reference.fields import flight_with_drag
 from tests.tiers.sweep import sweep
 
@@ -266,7 +266,7 @@ def test_what_lies_still_under_a_stiff_spring_is_not_reported():
     assert forces[:, 1].sum() == pytest.approx(1e7 * (1.0 - 0.85) + 2.0 * 9.81, rel=1e-3)
 
 
-PAIRS = [pair for pair in drawn_effects.pairs() if len(pair) == 2]
+PAIRS = [pair for pair in drawn_worlds.pairs() if len(pair) == 2]
 DRAWN = np.random.default_rng(35).choice(len(PAIRS), 10, replace=False).tolist()
 SHORT = [index for index in DRAWN if PAIRS[index] != ("wind", "friction")]
 
@@ -291,7 +291,7 @@ FOUND = [
     ("names", "on_floor", "seed"), sweep(FOUND, FOUND[1:-1], lambda draw: "-".join(map(str, draw)))
 )
 def test_draws_that_once_gave_energy(names, on_floor, seed):
-    """The energy of each stays within the law of `rigid_env.lab.measure.drawn_effects`."""
+    """The energy of each stays within the law of `benchmarks.drawn_worlds`."""
     outcome = one(names, on_floor, "fast", seed)
     assert outcome.is_finite.all()
     assert (outcome.excess <= 0.0).all()
@@ -316,7 +316,7 @@ def test_no_energy_from_nowhere(index, is_exhaustive):
     """Ten pairs of effects with drawn parameters; all pairs: `python -m benchmarks.drawn_effects`."""
     for seed in range(5 if is_exhaustive else 2):
         rng = np.random.default_rng([35, index, seed])
-        scene = drawn_effects.draw_scene(rng, PAIRS[index], on_floor=True)
-        outcome = drawn_effects.run(rng, scene, ("fast", "balanced")[seed % 2], 4)
+        scene = drawn_worlds.draw_scene(rng, PAIRS[index], on_floor=True)
+        outcome = drawn_worlds.run(rng, scene, ("fast", "balanced")[seed % 2], 4)
         assert outcome.is_finite.all()
         assert (outcome.excess <= 0.0).all()

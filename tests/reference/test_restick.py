@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigid_env.lab.hard_cases.cases import letting_go
+from rigid_env.hard_cases.cases import letting_go
 from tests.reference import restick
 from tests.reference.restick import Ellipsoid, State
 

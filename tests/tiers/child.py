@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.processes import killed_after, wait_for_end
 from physics.kernels.compile.compiler_choice import PYTHON, VARIABLE
-from rigid_env.lab.measure.processes import killed_after, wait_for_end
 
 SILENCE = 1600.0
 """Time without a report after which its process is killed [s]; the time-out of a test in pyproject.toml is shorter."""

@@ -1,1 +1,1 @@
-"""The hard cases: situations in which rigid-body simulators break, each with a known outcome (docs/hard-cases.md)."""
+"""The command `rigid-env hard-cases`: run `rigid_env.hard_cases` in our engine and in others, and show the outcomes."""

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Setting, UnsupportedError
+from rigid_env.hard_cases.case import Case, Setting, UnsupportedError
 from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
-from rigid_env.lab.measure.peers import ENGINES, Engine, Unsupported, is_installed, load
+from rigid_env.lab.measure.peers import Engine, Unsupported
 
 
 class PeerWorld:
@@ -37,17 +36,11 @@ class PeerWorld:
         self._look()
 
 
-def load_engines() -> tuple[dict[str, Engine], list[str]]:
-    """Installed engines by name, and the names of those that are not."""
-    found = {name: load(name) for name in ENGINES if is_installed(name)}
-    return found, [name for name in ENGINES if name not in found]
-
-
 def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
     """The outcome of a case at a peer's first setting with which it holds, else at its defaults."""
     outcomes = []
     for index in range(_setting_count(engine)):
-        used: list[str] = []
+        used = ["default"]  # until the case makes its first world
 
         def make(scene: physics.Scene, dt: float, index=index, used=used) -> PeerWorld:
             known = list(engine.settings(scene).items())
@@ -56,7 +49,7 @@ def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
             return PeerWorld(engine, scene, dt, dict(options))
 
         outcome = run_case(case, replace(setting, maker=make), engine.name, "default")
-        outcomes.append(replace(outcome, accuracy=used[0] if used else "default"))
+        outcomes.append(replace(outcome, accuracy=used[:2][-1]))
         if outcome.status in (Status.HOLDS, Status.UNSUPPORTED):
             break
     return next((one for one in outcomes if one.status is Status.HOLDS), outcomes[0])
@@ -67,17 +60,3 @@ def _setting_count(engine: Engine) -> int:
     body = physics.Sphere(1.0, 1.0, pos=(0, 2, 0))
     touching = [physics.Contact(0.5), physics.Friction(0.5), physics.Gravity()]
     return len(engine.settings(physics.Scene([body], [physics.HalfSpace((0, 1, 0))], touching)))
-
-
-def run_peers(
-    cases: Sequence[Case], engines: Sequence[Engine], setting: Setting, tick: Callable[[str], None]
-) -> Iterator[Outcome]:
-    """Outcomes of all cases that look at nothing but the state, case by case; Ctrl-C ends it, not the program."""
-    try:
-        for case in cases:
-            for engine in engines:
-                if case.peers:
-                    tick(f"{case.number} {case.name}, {engine.name}")
-                    yield run_peer(case, engine, setting)
-    except KeyboardInterrupt:
-        return

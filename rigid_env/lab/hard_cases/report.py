@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 
 from physics import validation
-from physics.plan import accuracy as knobs
+from physics.accuracy import PRESETS
 from rigid_env.extras import install_line
-from rigid_env.lab.hard_cases import peers as others
+from rigid_env.hard_cases.case import Case, Setting
 from rigid_env.lab.hard_cases import show
-from rigid_env.lab.hard_cases.case import Case, Setting
-from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_all
+from rigid_env.lab.hard_cases.peers import run_peer
+from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.lab.measure.peers import ENGINES, Engine, is_installed, load
 from rigid_env.terminal import progress_bar
 
 
@@ -62,9 +64,9 @@ def make_plan(
     """
     accuracies = tuple(name.strip() for name in accuracy.split(",") if name.strip())
     for name in accuracies:
-        validation.one_of(name, knobs.PRESETS, "accuracy")
+        validation.one_of(name, PRESETS, "accuracy")
     if not accuracies:
-        raise ValueError(f"accuracy is {accuracy!r}; allowed are {', '.join(knobs.PRESETS)}, with commas")
+        raise ValueError(f"accuracy is {accuracy!r}; allowed are {', '.join(PRESETS)}, with commas")
     validation.positive(dt, (), "dt")
     try:
         grid = tuple(float(text) for text in steps.split(",") if text.strip())
@@ -82,21 +84,32 @@ class Report:
     Attributes
     ----------
     plan : Plan
-    outcomes, peers : tuple of Outcome
-        Ours, and those of other engines.
+    outcomes : tuple of Outcome
+        Ours, then those of other engines.
     is_complete : bool
         False: interrupted.
     """
 
     plan: Plan
-    outcomes: tuple[Outcome, ...]
-    peers: tuple[Outcome, ...]
-    is_complete: bool
+    outcomes: tuple[Outcome, ...] = ()
+    is_complete: bool = False
+
+    @property
+    def ours(self) -> list[Outcome]:
+        """Those of our engine."""
+        return [one for one in self.outcomes if one.engine == OURS]
 
     @property
     def details(self) -> list[Outcome]:
         """Ours at the step at which details are shown."""
-        return [one for one in self.outcomes if one.dt == self.plan.dt]
+        return [one for one in self.ours if one.dt == self.plan.dt]
+
+    @property
+    def beside(self) -> list[Outcome]:
+        """Those of other engines, by case, each after ours at the first accuracy; none without other engines."""
+        theirs = [one for one in self.outcomes if one.engine != OURS]
+        first = [one for one in self.details if one.accuracy == self.plan.accuracies[0] and one.case.peers]
+        return sorted([*first, *theirs], key=lambda one: one.case.number) if theirs else []
 
     @property
     def has_failed(self) -> bool:
@@ -107,62 +120,65 @@ class Report:
         """JSON-able."""
         plan = self.plan
         settings = {"accuracies": plan.accuracies, "dt": plan.dt, "steps": plan.steps, "is_thorough": plan.is_thorough}
-        rows = [one.to_dict() for one in (*self.outcomes, *self.peers)]
+        rows = [one.to_dict() for one in self.outcomes]
         return {"name": "hard_cases", "is_complete": self.is_complete, "settings": settings, "rows": rows}
 
 
 def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Report:
-    """Run all of it with a progress bar; print tables; after every outcome of ours `keep` holds all so far.
-
-    Other engines make the shorter runs: all their settings are tried.
-    """
-    engines, missing = others.load_engines() if plan.has_peers else ({}, [])
-    if missing:
+    """Run all of it with a progress bar; print tables; `keep` holds all outcomes so far. Ctrl-C ends only the run."""
+    names = [name for name in ENGINES if plan.has_peers and is_installed(name)]
+    if missing := [name for name in ENGINES if plan.has_peers and name not in names]:
         console.print(f"without {', '.join(missing)}, not installed: {install_line('peers')}", soft_wrap=True)
-    peer_runs = len(engines) * sum(case.peers for case in plan.cases)
-    done, theirs = [], []
-    total = len(plan.cases) * len(plan.settings)
+    todo, report = _jobs(plan, [load(name) for name in names]), Report(plan)
     with progress_bar(console) as progress:
-        task = progress.add_task("hard cases", total=total + peer_runs)
-
-        def tick(what: str) -> None:
-            progress.update(task, description=what)
-
-        for outcome in run_all(plan.cases, plan.settings, tick):
-            done.append(outcome)
-            progress.advance(task)
-            if keep is not None:
-                write_json(keep, Report(plan, tuple(done), (), False).to_dict())
-        if len(done) == total:
-            setting = Setting(dt=plan.dt, is_thorough=False)
-            for outcome in others.run_peers(plan.cases, list(engines.values()), setting, tick):
-                theirs.append(outcome)
+        task = progress.add_task("hard cases", total=len(todo))
+        try:
+            for what, job in todo:
+                progress.update(task, description=what)
+                found = (*report.outcomes, job())
+                report = Report(plan, found, len(found) == len(todo))
                 progress.advance(task)
-    is_complete = len(done) == total and len(theirs) == peer_runs
-    report = Report(plan, tuple(done), tuple(theirs), is_complete)
-    if keep is not None:
-        write_json(keep, report.to_dict())
+                _keep(keep, report)
+        except KeyboardInterrupt:
+            _keep(keep, report)
     _print(console, report)
     return report
 
 
+def _keep(path: Path | None, report: Report) -> None:
+    if path is not None:
+        write_json(path, report.to_dict())
+
+
+def _jobs(plan: Plan, engines: Sequence[Engine]) -> list[tuple[str, Callable[[], Outcome]]]:
+    """Names and calls of all runs: ours case by case, then other engines on cases that look at motion alone.
+
+    These make the shorter runs: all their settings are tried.
+    """
+    short = Setting(dt=plan.dt, is_thorough=False)
+    ours = [
+        (f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms", partial(run_case, case, on))
+        for case in plan.cases
+        for on in plan.settings
+    ]
+    theirs = [
+        (f"{case.number} {case.name}, {engine.name}", partial(run_peer, case, engine, short))
+        for case in plan.cases
+        for engine in engines
+        if case.peers
+    ]
+    return ours + theirs
+
+
 def _print(console: Console, report: Report) -> None:
     for accuracy in report.plan.accuracies:
-        found = [one for one in report.details if one.accuracy == accuracy]
-        if found:
+        if found := [one for one in report.details if one.accuracy == accuracy]:
             console.print(show.detail_table(found, f"{accuracy}, {1e3 * report.plan.dt:g} ms"))
             console.print(f"{accuracy}: {show.summary(found)}")
     if report.plan.steps:
-        console.print(show.grid_table(report.outcomes, "at which steps each holds"))
-    if report.peers:
-        console.print(show.detail_table(_beside(report), "beside other engines"))
+        console.print(show.grid_table(report.ours, "at which steps each holds"))
+    if report.beside:  # the engine stands for the name of the case
+        named = [replace(one, case=replace(one.case, name=f"{one.engine}, {one.accuracy}")) for one in report.beside]
+        console.print(show.detail_table(named, "beside other engines"))
     if not report.is_complete:
         console.print("interrupted: what is shown is what was done")
-
-
-def _beside(report: Report) -> Sequence[Outcome]:
-    """Ours at the first accuracy and theirs, case by case; the engine stands for the name of the case."""
-    first = report.plan.accuracies[0]
-    ours = [one for one in report.details if one.accuracy == first and one.case.peers]
-    rows = sorted([*ours, *report.peers], key=lambda one: (one.case.number, one.engine != OURS))
-    return [replace(one, case=replace(one.case, name=f"{one.engine}, {one.accuracy}")) for one in rows]

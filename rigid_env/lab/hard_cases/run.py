@@ -1,16 +1,15 @@
-"""Run hard cases at settings, one after the other; what is done is never lost."""
+"""One hard case at one setting: whatever goes wrong inside it is an outcome."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, UnsupportedError
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
 
 OURS = "rigid-env"
 
@@ -73,7 +72,7 @@ def _check_to_dict(check: Check) -> dict:
 
 
 def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | None = None) -> Outcome:
-    """Run one case at one setting. Whatever goes wrong inside it is an outcome, not an exception.
+    """Run one case at one setting.
 
     Parameters
     ----------
@@ -82,8 +81,7 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
     engine, accuracy : str
         As in `Outcome`; None: the setting's preset.
     """
-    start, checks, reason = time.perf_counter(), (), case.missing
-    status = Status.MISSING
+    start, checks, reason, status = time.perf_counter(), (), case.missing, Status.MISSING
     if case.run is not None:
         try:
             with np.errstate(all="ignore"):  # what has blown up is for the checks to say
@@ -95,18 +93,4 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
         except Exception as error:  # of one case: the others are still to be run
             status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
-    name = accuracy if accuracy is not None else str(setting.accuracy)
-    return Outcome(case, engine, name, setting.dt, status, checks, reason, seconds)
-
-
-def run_all(
-    cases: Sequence[Case], settings: Sequence[Setting], tick: Callable[[str], None] = lambda what: None
-) -> Iterator[Outcome]:
-    """Outcomes of our engine, case by case, each as soon as it is there; Ctrl-C ends it, not the program."""
-    try:
-        for case in cases:
-            for setting in settings:
-                tick(f"{case.number} {case.name}, {setting.accuracy}, {1e3 * setting.dt:g} ms")
-                yield run_case(case, setting)
-    except KeyboardInterrupt:
-        return
+    return Outcome(case, engine, accuracy or str(setting.accuracy), setting.dt, status, checks, reason, seconds)

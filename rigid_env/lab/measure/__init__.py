@@ -1,7 +1,7 @@
-"""Measuring speed and accuracy: what `rigid-env bench`, `rigid-env accuracy` and `benchmarks/` share.
+"""Measure speed and accuracy: what `rigid-env bench`, `rigid-env accuracy` and `benchmarks/` share.
 
-`timing` has the arithmetic (repeats, medians, ratios), `machine` says where a number was measured,
-`workloads` is the work our engine is given, `mujoco_scene` the same work for MuJoCo, `rows` pairs the two,
+`timing` takes turns and has the arithmetic (repeats, medians, ratios), `machine` says where a number was measured and
+writes it, `workloads` is the work our engine is given, `mujoco_scene` the same work for MuJoCo, `rows` pairs the two,
 `environments` is the work of environments, and `table` prints.
 
 Error against time is `physics.frontier`'s: `truths` are scenes with a known outcome, `peers` other engines on them,

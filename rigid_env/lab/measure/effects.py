@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import physics
 from physics import scenes
@@ -28,9 +27,6 @@ TOUCH = (GRAVITY, physics.Contact(), physics.Friction(50.0))
 # A slope on which a slab slides for ever, across the grain.
 SLAB = physics.Block((2.0, 0.2, 2.0), 2.0, pos=(0.0, 0.1, 0.0))
 SLOPE = physics.Gravity((5.0, -8.0, 3.0))
-
-# Lines of a page between which `write_markdown` puts the table.
-BEGIN, END = "<!-- costs: rigid-env effects --markdown docs/effects.md -->", "<!-- end of costs -->"
 
 
 def _flying() -> physics.Body:
@@ -124,19 +120,17 @@ def bytes_per_body(world: physics.World) -> int:
     return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
 
 
-def chosen(names: Sequence[str], page: Path | None) -> list[str]:
+def chosen(names: Sequence[str]) -> list[str]:
     """The effects to measure: those of the names, all where there are none.
 
     Raises
     ------
     ValueError
-        A name that is none of `CASES`, or a page that would lose the rows of all others.
+        A name that is none of `CASES`.
     """
     for name in names:
         if name not in CASES:
             raise ValueError(f"effect is {name!r}; allowed are {', '.join(nearest_first(name, CASES))}")
-    if names and page is not None:
-        raise ValueError(f"markdown is {str(page)!r} for {', '.join(names)} only; a page is written for all effects")
     return list(names or CASES)
 
 
@@ -163,31 +157,3 @@ def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callabl
         key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",
         peer=spreads[OFF], notes={"added_ns_per_step": added, "added_bytes_per_body": stored[ON] - stored[OFF]},
     )  # fmt: skip
-
-
-def markdown(rows: list[Row]) -> str:
-    """The rows as a table of a page: what an effect adds to a step, in time and in memory."""
-    lines = [
-        "| effect | its scene without it [ns a step] | adds [ns] | stores [bytes a body] |",
-        "| --- | --- | --- | --- |",
-    ]
-    for row in rows:
-        alone, added = 1e9 / row.peer.median, row.notes["added_ns_per_step"]
-        lines.append(f"| {row.what} | {alone:.0f} | {added:.0f} | {row.notes['added_bytes_per_body']} |")
-    return "\n".join(lines)
-
-
-def write_markdown(path: Path, rows: list[Row], accuracy: str) -> None:
-    """Put the table of `rows` into a page, between the lines `BEGIN` and `END`.
-
-    Raises
-    ------
-    ValueError
-        The page does not have those lines.
-    """
-    head, found, rest = path.read_text(encoding="utf-8").partition(BEGIN)
-    _, closed, tail = rest.partition(END)
-    if not (found and closed):
-        raise ValueError(f"markdown is {str(path)!r}; allowed are pages with the lines {BEGIN} and {END}")
-    text = f"\nMedians at `{accuracy}`, one world, steps of {STEP} s.\n\n{markdown(rows)}\n\n"
-    path.write_text(f"{head}{BEGIN}\n{text}{END}{tail}", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Requirements of every plot of the command line."""
+"""Figures of every plot of the command line, and what they require."""
 
 from __future__ import annotations
 
@@ -21,3 +21,20 @@ def require_matplotlib() -> None:
 def lacks_matplotlib() -> str:
     """Line that installs matplotlib; "" where it is installed."""
     return lacking("plot", "matplotlib", purpose=PURPOSE)
+
+
+def make_figure(width: float, height: float):
+    """A `matplotlib.figure.Figure` of this size [in], written without a display.
+
+    Raises
+    ------
+    gymnasium.error.DependencyNotInstalled
+        matplotlib is missing.
+    """
+    require_matplotlib()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure

@@ -136,9 +136,9 @@ def measure(
     for run in runs.values():
         run.world.restore(run.start)
     acted = acted_shares(worlds[WHOLE], [worlds[name] for name in names], steps)
-    whole = spreads[WHOLE].samples
+    ratios = {name: spreads[name] / spreads[WHOLE] for name in names}
     return [
-        Share(name, share, Spread(tuple(1.0 - b / a for a, b in zip(whole, spreads[name].samples))))
+        Share(name, share, Spread(tuple(1.0 - ratio for ratio in ratios[name].samples)))
         for name, share in zip(names, acted)
     ]
 

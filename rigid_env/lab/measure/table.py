@@ -30,29 +30,29 @@ def cells(row: Row) -> tuple[Text, ...]:
         Text(row.accuracy or "-"),
         two_lines(row.ours),
         two_lines(row.peer) if row.peer else Text("-"),
-        two_lines(ratio) if ratio else Text("-"),
+        two_lines(ratio, digits=4) if ratio else Text("-"),
         Text("-" if row.target is None else f"{'≥' if row.is_ratio else '≤'} {row.target:g}"),
         VERDICTS[row.is_passed],
     )
 
 
-def number(value: float) -> str:
-    """Three digits, with k and M for large numbers."""
-    return number_range(value, value)
+def number(value: float, digits: int = 3) -> str:
+    """Some digits, with k and M for large numbers."""
+    return number_range(value, value, digits)
 
 
-def number_range(lowest: float, highest: float) -> str:
+def number_range(lowest: float, highest: float, digits: int = 3) -> str:
     """Both numbers as `number` has them, or one if they are the same; a letter stands once, behind the second."""
     size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
-    ends = dict.fromkeys(f"{value / size:.3g}" for value in (lowest, highest))
+    ends = dict.fromkeys(f"{value / size:.{digits}g}" for value in (lowest, highest))
     return "..".join(ends) + letter
 
 
-def two_lines(spread: Spread) -> Text:
+def two_lines(spread: Spread, digits: int = 3) -> Text:
     """The median, and below it lowest and highest sample."""
     if len(spread.samples) == 1:
-        return Text(number(spread.median))
-    return _over(number(spread.median), number_range(spread.lowest, spread.highest))
+        return Text(number(spread.median, digits))
+    return _over(number(spread.median, digits), number_range(spread.lowest, spread.highest, digits))
 
 
 def _over(first: str, second: str) -> Text:

@@ -15,7 +15,8 @@ class Spread:
     Attributes
     ----------
     samples : tuple of float
-        In the order in which they were measured, in the unit of the row that holds them.
+        In the order in which they were measured, in the unit of the row that holds them. A contestant of `interleave`
+        whose measurement is several numbers has samples that hold them all.
     """
 
     samples: tuple[float, ...]
@@ -34,6 +35,10 @@ class Spread:
     def highest(self) -> float:
         """Largest sample."""
         return max(self.samples)
+
+    def __truediv__(self, other: Spread) -> Spread:
+        """Ratio to another one that was measured in the same turns, turn by turn."""
+        return Spread(tuple(a / b for a, b in zip(self.samples, other.samples, strict=True)))
 
     def to_dict(self) -> dict:
         """For JSON: median, min, max and all samples."""
@@ -83,9 +88,7 @@ class Row:
     @property
     def ratio(self) -> Spread | None:
         """Ours over the peer's, repeat by repeat; None without peer."""
-        if self.peer is None:
-            return None
-        return Spread(tuple(a / b for a, b in zip(self.ours.samples, self.peer.samples)))
+        return None if self.peer is None else self.ours / self.peer
 
     @property
     def is_passed(self) -> bool | None:
@@ -108,18 +111,24 @@ class Row:
 
 
 def interleave(
-    contestants: dict[str, Callable[[], float]], repeats: int, tick: Callable[[str], None] | None = None
+    contestants: dict[str, Callable[[], float]],
+    repeats: int,
+    tick: Callable[[str], None] | None = None,
+    *,
+    is_warm: bool = False,
 ) -> dict[str, Spread]:
-    """Measure contestants in turns, A B A B ..., so that what disturbs the machine disturbs them alike.
+    """Measure contestants in turns, A B, B A, ..., so that a disturbance of the machine disturbs them alike.
 
     Parameters
     ----------
     contestants : dict of callables
-        Each runs once and returns its measurement. All run once before anything counts.
+        Each runs once and returns its measurement.
     repeats : int
         Of each.
     tick : callable, optional
         Told a contestant's name before each of its runs.
+    is_warm : bool
+        Whether the first runs count; else all run once before.
 
     Returns
     -------
@@ -127,12 +136,12 @@ def interleave(
         Under the same names; sample k of all was measured in the same turn.
     """
     samples: dict[str, list[float]] = {name: [] for name in contestants}
-    for turn in range(repeats + 1):
-        for name, run in contestants.items():
+    for turn in range(0 if is_warm else -1, repeats):
+        for name in list(contestants) if turn % 2 == 0 or turn < 0 else reversed(contestants):
             if tick is not None:
                 tick(name)
-            value = run()
-            if turn > 0:
+            value = contestants[name]()
+            if turn >= 0:
                 samples[name].append(value)
     return {name: Spread(tuple(values)) for name, values in samples.items()}
 

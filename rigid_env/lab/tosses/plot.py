@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from physics.work_precision.frontier_plot import add_legend
+from rigid_env.lab.measure.plotting import make_figure
 from rigid_env.lab.tosses.report import Report
 
 SIZE = (10.0, 7.0)  # [in]
@@ -15,11 +16,7 @@ DPI = 120
 
 def write_plot(path: Path, report: Report) -> None:
     """Above: error against time at each accuracy; below: error along the toss. Left position, right rotation."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=SIZE, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = make_figure(*SIZE)
     axes = figure.subplots(2, 2)
     for column, (name, unit) in enumerate((("position", "cube widths"), ("rotation", "deg"))):
         _draw_ladder(axes[0, column], report, name, unit)

@@ -11,8 +11,8 @@ import numpy as np
 import physics
 from physics.kernels.time_stepping import event_log
 from physics.scene.canonical_scenes import GRAVITY
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, UnsupportedError, none_of, within
-from rigid_env.lab.hard_cases.cases.scenery import (
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError, none_of, within
+from rigid_env.hard_cases.cases.scenery import (
     EPS,
     attitude,
     boxed,

@@ -134,13 +134,11 @@ class Setting:
 
     @property
     def is_event_driven(self) -> bool:
-        """True if events are located, so that outcomes do not depend on the step."""
-        return self.maker is None and resolve(self.accuracy).scheme == "events"
+        """True if events are located, so that outcomes do not depend on the step.
 
-    @property
-    def meets_an_error(self) -> bool:
-        """True if bodies that touch each other are stepped to an error: it is dear, so quick runs are smaller."""
-        return self.is_event_driven
+        Bodies that touch each other are stepped to an error then, which is dear: quick runs are smaller.
+        """
+        return self.maker is None and resolve(self.accuracy).scheme == "events"
 
     @property
     def is_ours(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import physics
 from physics.scene.canonical_scenes import GRAVITY
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
 
 
 def balloon(on: Setting) -> Sequence[Check]:

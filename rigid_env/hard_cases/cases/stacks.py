@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 import physics
-from rigid_env.lab.hard_cases.case import Check, Setting, none_of
+from rigid_env.hard_cases.case import Check, Setting, none_of
 
 G = 9.81  # [m/s²]
 CUBE = (1.0, 1.0, 1.0)  # [m]

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
-from rigid_env.lab.hard_cases.cases import stacks
-from rigid_env.lab.hard_cases.cases.stacks import G
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.cases import stacks
+from rigid_env.hard_cases.cases.stacks import G
 
 # Share by which the condition for holding is met or missed.
 NEAR = 0.01
@@ -103,7 +103,7 @@ def dominoes(setting: Setting) -> list[Check]:
     """
     tilt = 0.15
     first = physics.Block((0.2, 1, 0.5), 1.0, pos=(0.1, 0.55, 0), quat=(math.cos(tilt), 0, 0, -math.sin(tilt)))
-    count = 8 if setting.meets_an_error and not setting.is_thorough else 20
+    count = 8 if setting.is_event_driven and not setting.is_thorough else 20
     others = [physics.Block((0.2, 1, 0.5), 1.0, pos=(0.6 * k, 0.5, 0)) for k in range(1, count)]
     world = setting.world(stacks.pile([first, *others]))
     fallen = np.full(count, np.inf)

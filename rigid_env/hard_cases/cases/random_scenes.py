@@ -14,7 +14,7 @@ import physics
 from physics.accuracy import resolve
 from physics.annotations import Preset
 from physics.kernels.state import layout as at
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 
 HALF_WIDTH = 10.0  # of the closed box that all scenes are in [m]
 CELL = 5.0  # distance of the places from which several bodies start [m]

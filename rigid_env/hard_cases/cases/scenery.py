@@ -15,7 +15,7 @@ import physics
 from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
 from physics.work_precision.errors import angles_between, mechanical_energy
-from rigid_env.lab.hard_cases.case import Check, Setting, none_of
+from rigid_env.hard_cases.case import Check, Setting, none_of
 
 EPS = float(np.finfo(float).eps)
 FLOOR = physics.HalfSpace((0, 1, 0))

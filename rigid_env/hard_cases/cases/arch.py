@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, at_least, none_of
-from rigid_env.lab.hard_cases.cases import stacks
+from rigid_env.hard_cases.case import Case, Check, Setting, at_least, none_of
+from rigid_env.hard_cases.cases import stacks
 
 FRICTION = 0.8  # stones slide on each other only below about 0.4: what gives are hinges
 WIDTH, DENSITY = 0.25, 1000.0  # of the arch along z [m], of the stone [kg/m³]

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
-from rigid_env.lab.hard_cases.cases.scenery import FLOOR
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.cases.scenery import FLOOR
 
 HALF, THIN = 1.0, 0.01  # half edges of the rod [m]
 REACH = math.hypot(HALF, THIN)  # of its corners from its axis of turning [m]

@@ -9,7 +9,7 @@ import numpy as np
 
 import physics
 from physics.accuracy import resolve
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, within
+from rigid_env.hard_cases.case import Case, Check, Setting, within
 
 RADIUS = 0.5  # [m]
 SPEED = 3.0  # of the ball that strikes [m/s]

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipkm1
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, within
-from rigid_env.lab.hard_cases.cases.scenery import EPS, attitude, energy, free, is_finite, none_of_finite
+from rigid_env.hard_cases.case import Case, Check, Setting, within
+from rigid_env.hard_cases.cases.scenery import EPS, attitude, energy, free, is_finite, none_of_finite
 
 TURN_AT_ONCE = 0.06  # largest turn that the free-rotation flow makes at once [rad]
 ROUNDING = math.sqrt(300) * EPS  # of the attitude in it [rad]: some 300 operations, which round at random

@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 import physics
 from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
-from rigid_env.lab.hard_cases.cases.scenery import (
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
+from rigid_env.hard_cases.cases.scenery import (
     EPS,
     FLOOR,
     attitude,

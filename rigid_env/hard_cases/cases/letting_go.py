@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 import physics
 from physics.accuracy import resolve
 from physics.scene.canonical_scenes import GRAVITY
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
-from rigid_env.lab.hard_cases.cases.scenery import EPS, FLOOR, laws, on_floor, turned
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
+from rigid_env.hard_cases.cases.scenery import EPS, FLOOR, laws, on_floor, turned
 
 LEFT = physics.HalfSpace((1, 0, 0))
 LOOKS = 400  # at a push along its way, for the first sign

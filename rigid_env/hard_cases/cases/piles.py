@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 import physics
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
-from rigid_env.lab.hard_cases.cases import stacks
-from rigid_env.lab.hard_cases.cases.stacks import CUBE, G
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.cases import stacks
+from rigid_env.hard_cases.cases.stacks import CUBE, G
 
 # Penetration that the published benchmark allows: sum over contacts of the squared depth [m²].
 BALLS_PENETRATION = 1.35e-4
@@ -124,7 +124,7 @@ def balls(setting: Setting) -> list[Check]:
     """
     rng = np.random.default_rng(0)
     checks, duration = [], setting.pick(10.0, 1.5)
-    side = 3 if setting.meets_an_error and not setting.is_thorough else 6
+    side = 3 if setting.is_event_driven and not setting.is_thorough else 6
     for restitution in (0.0, 1.0):
         bodies = [
             physics.Sphere(0.5, 1.0, pos=(1.1 * i + u, 1.5 + 1.1 * j, 1.1 * k + w))

@@ -15,8 +15,8 @@ import numpy as np
 import physics
 from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of
-from rigid_env.lab.hard_cases.cases.scenery import EPS, FLOOR, laws
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.cases.scenery import EPS, FLOOR, laws
 
 RADIUS = 0.03  # of the balls [m]
 SLAB = 0.5  # thickness of slabs [m]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from physics.keywords import nearest_first
-from rigid_env.lab.hard_cases.case import Case
+from rigid_env.hard_cases.case import Case
 
 # Each has a tuple CASES.
 MODULES = (
@@ -15,17 +15,8 @@ MODULES = (
 )  # fmt: skip
 
 
-def _gathered() -> tuple[Case, ...]:
-    cases = [case for name in MODULES for case in import_module(f"rigid_env.lab.hard_cases.cases.{name}").CASES]
-    for key in ("number", "name"):
-        values = [getattr(case, key) for case in cases]
-        twice = sorted({value for value in values if values.count(value) > 1})
-        if twice:
-            raise ValueError(f"two hard cases have the {key} {twice[0]!r}; each must have its own")
-    return tuple(sorted(cases, key=lambda case: case.number))
-
-
-CASES = _gathered()
+_GATHERED = (case for name in MODULES for case in import_module(f"rigid_env.hard_cases.cases.{name}").CASES)
+CASES: tuple[Case, ...] = tuple(sorted(_GATHERED, key=lambda case: case.number))
 
 
 def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:

@@ -10,8 +10,8 @@ import numpy as np
 
 import physics
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
-from rigid_env.lab.hard_cases.cases.scenery import (
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
+from rigid_env.hard_cases.cases.scenery import (
     EPS,
     FLOOR,
     block,

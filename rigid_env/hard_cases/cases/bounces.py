@@ -11,8 +11,8 @@ import numpy as np
 import physics
 from physics.accuracy import resolve
 from physics.scene.canonical_scenes import GRAVITY, MASS, SIZE
-from rigid_env.lab.hard_cases.case import Case, Check, Setting, none_of, within
-from rigid_env.lab.hard_cases.cases.scenery import (
+from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
+from rigid_env.hard_cases.cases.scenery import (
     EPS,
     block,
     boxed,
