@@ -157,10 +157,6 @@ def test_it_is_shown_on_a_screen():
     assert "status OK" in text
 
 
-def wrong_state() -> TaskState:
-    return BlockReachEnv().get_state()
-
-
 def other_out() -> TaskRollout:
     return rollout(started(BlockReach(3)), np.zeros((3, 2, 6)))
 
