@@ -13,6 +13,7 @@ from physics.accuracy import Accuracy
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.bound_call import Work
+from physics.parallel.exclusive import Exclusive
 from physics.parallel.team import Team
 from physics.plan.plan import Plan
 from physics.scene.effects import Actuator, Sleeping
@@ -50,7 +51,7 @@ class ActuatorState(Protocol):
         """Forget all commands that these worlds were given."""
 
 
-class Batch:
+class Batch(Exclusive):
     """Many worlds of one scene as arrays.
 
     Attributes
@@ -95,8 +96,8 @@ class Batch:
         What is told of every step; see `physics.Recorder`.
     telling : int or None
         The thread that tells the recorder of its step.
-    is_free : bool
-        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
+    is_in_use : bool
+        Whether a thread is in a method that changes or copies the world. Such a method raises RuntimeError while
         another thread is in one: a world belongs to one thread at a time.
     is_torn : bool
         Whether another thread was in one when this process was forked.
@@ -132,7 +133,6 @@ class Batch:
     motions: list
     recorder: StepListener | None
     telling: int | None
-    is_free: bool
     is_torn: bool
 
     if TYPE_CHECKING:  # of `World`

@@ -94,7 +94,6 @@ class World(Batch):
         self.time = 0.0
         self.recorder = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
-        self.is_free = True
         self._allocate()
         batch_arrays.fill(self)
         setters.check_place(self, self.state, self.params, np.arange(self.worlds), "scene")
@@ -421,9 +420,11 @@ class World(Batch):
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        flags = ("is_free", "is_torn", "telling")
+        flags = ("is_torn", "telling")
         for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *flags, *views):
             del kept[name]
+        for name in ("is_free", "_user"):  # of `Exclusive`: a copy is free
+            kept.pop(name, None)
         return kept
 
     def __setstate__(self, kept):

@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from physics.parallel.exclusive import exclusive, in_use
+from physics.parallel.exclusive import Exclusive, exclusive, in_use
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
@@ -27,7 +27,7 @@ from rigid_env.tasks.state import TaskState, put, take
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
 
 
-class RigidEnv(gym.Env[Obs, NDArray[Any]]):
+class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters
@@ -58,7 +58,6 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}  # noqa: RUF012
-    is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from physics.parallel.exclusive import exclusive
+from physics.parallel.exclusive import Exclusive, exclusive
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
@@ -31,7 +31,7 @@ Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dic
 """Observations, rewards, terminations, truncations and infos of one control step."""
 
 
-class RigidVectorEnv(BatchAttributes[Obs]):
+class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
@@ -58,7 +58,6 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     """
 
     task: Task
-    is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
     _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
 
     def __init__(
