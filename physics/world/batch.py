@@ -17,6 +17,7 @@ from physics.parallel.exclusive import Exclusive
 from physics.parallel.team import Team
 from physics.plan.plan import Plan
 from physics.scene.effects import Actuator, Sleeping
+from physics.scene.field_errors import raised
 from physics.scene.scene import Scene
 from physics.world.snapshot import KEPT
 from physics.world.step_listener import StepListener
@@ -142,10 +143,19 @@ class Batch(Exclusive):
     def make(self, calls: list[Work], duration: float) -> None:
         """Make kernel calls that take so long [s]."""
         if self.plan.fields:
-            for scratch in self.scratch:
-                body_records(scratch)["call_start"] = self.time
-        self.team.run(calls)
+            self._make_with_fields(calls)
+        else:
+            self.team.run(calls)
         self.time += duration
+
+    def _make_with_fields(self, calls: list[Work]) -> None:
+        """Tell fields the time, and make the calls; an exception of a field then names its class."""
+        for scratch in self.scratch:
+            body_records(scratch)["call_start"] = self.time
+        try:
+            self.team.run(calls)
+        except Exception as error:
+            raise raised(error, self.plan.fields)  # noqa: B904 (it has a cause already)
 
     def no_wrench(self) -> NDArray[np.float64]:
         """(worlds, bodies, 6) float64 zeros: an array for wrenches."""

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics.parallel.exclusive import Exclusive, exclusive, in_use
+from physics.undo import Undo, undo_on_error
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
@@ -110,15 +111,11 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         TypeError, ValueError
             An option that is unknown or out of range. Nothing has changed then, the generator included.
         """
-        kept = self._np_random, self._np_random_seed, self.task.generators[0]
-        try:
+        with undo_on_error(self._remember_generator()):
             super().reset(seed=seed)
             self.task.generators[0] = self.np_random
             self.task.start(self._world, options)
             self._source.start(self._world)
-        except BaseException:
-            self._np_random, self._np_random_seed, self.task.generators[0] = kept
-            raise
         self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
@@ -126,6 +123,14 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         drawn = {name: value_of(values[name][0]) for name in self.task.own_draws}
         info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
         return self._source.one(0), {**info, **drawn}
+
+    def _remember_generator(self) -> Undo:
+        kept = self._np_random, self._np_random_seed, self.task.generators[0]
+
+        def put_back() -> None:
+            self._np_random, self._np_random_seed, self.task.generators[0] = kept
+
+        return put_back
 
     def step(self, action: ArrayLike) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; see `gymnasium.Env.step`.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.undo import Undo
+
 
 class Before:
     """All that a control step changes, kept in arrays that are there for it.
@@ -24,8 +26,8 @@ class Before:
         self._time, self._clock, self._actuation = 0.0, 0, None
         self._generators: dict[int, dict] = {}
 
-    def keep(self) -> None:
-        """Copy what the coming step changes."""
+    def keep(self) -> Undo:
+        """Copy what the coming step changes; returns `put_back`."""
         task = self._task
         for array, kept in self._kept:
             kept[...] = array
@@ -35,6 +37,7 @@ class Before:
         if task.disturbed is not None:
             due = task.disturbed.due().tolist()
             self._generators = {world: task.generators[world].bit_generator.state for world in due}
+        return self.put_back
 
     def put_back(self) -> None:
         """Be as it was when `keep` was called."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from physics.undo import undo_on_error
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.named import Named
@@ -111,15 +112,11 @@ class Functions:
         task.given[...] = actions
         if not np.isfinite(task.given).all():
             raise task.not_finite(int(np.flatnonzero(~np.isfinite(task.given).all(axis=1))[0]))
-        self.before.keep()
-        try:
+        with undo_on_error(self.before.keep()):
             task.previous_action[...] = task.action
             np.clip(task.given, -1.0, 1.0, out=task.given)
             task.act()
             self._conclude()
-        except BaseException:  # of an interrupt, too
-            self.before.put_back()
-            raise
 
     def _conclude(self) -> None:
         task, worlds, outcome = self.task, self._all, self._outcome
