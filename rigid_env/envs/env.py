@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import reprlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +20,7 @@ from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
 from rigid_env.tasks import Task
+from rigid_env.tasks.actions import shaped
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
 from rigid_env.tasks.state import TaskState, put, take
@@ -164,16 +164,8 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         try:
             if not self._has_reset:
                 raise self._not_ready("step")
-            try:
-                action = np.asarray(action)
-            except ValueError:  # parts of different lengths
-                allowed = f"{self.task.action_size} numbers"
-                raise ValueError(f"action is {reprlib.repr(action)}; allowed are {allowed}") from None
-            if action.shape != self._action_shape:
-                shown = f" ({reprlib.repr(action.item())})" if action.ndim == 0 else ""
-                raise ValueError(f"action has shape {action.shape}{shown}; allowed is shape {self._action_shape}")
             task = self.task
-            task.take(action)
+            task.take(shaped(action, self._action_shape, "action"))
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":

@@ -19,7 +19,7 @@ from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.actions import ActionTable
+from rigid_env.tasks.actions import ActionTable, shaped
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
@@ -267,14 +267,7 @@ class Task(Starts):
             Actions of the wrong shape or not finite, or a function of the task that gives what it may not. Nothing has
             changed then.
         """
-        shape = self.action.shape
-        try:
-            actions = np.asarray(actions)
-        except ValueError:  # rows of different lengths
-            raise ValueError(f"actions is {reprlib.repr(actions)}; allowed is shape {shape}") from None
-        if actions.shape != shape:
-            raise ValueError(f"actions has shape {actions.shape}; allowed is shape {shape}")
-        self.take(actions)
+        self.take(shaped(actions, self.action.shape, "actions"))
 
     def take(self, actions: np.ndarray) -> None:
         """`step` with an array of the right shape; of one world its axis may be missing."""
