@@ -17,7 +17,7 @@ from physics.summary import parts_repr, shown
 from physics.undo import undo_on_error
 from physics.world import batch_arrays, restoring
 from physics.world.report import StepReport
-from physics.world.rollout_course import advance
+from physics.world.rollout_course import Room, advance
 from physics.world.snapshot import Snapshot
 from physics.world.world import World
 
@@ -72,6 +72,9 @@ class Rollout:
         """Memory of its arrays [bytes]."""
         arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
         return sum(array.nbytes for array in arrays)
+
+    def _as_room(self) -> Room:
+        return Room({name: getattr(self, name) for name in self.columns}, self.times, self.report_table)
 
     __repr__ = parts_repr
     _repr_html_ = parts_table
@@ -167,7 +170,7 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
     with undo_on_error(restoring.remember(world) if world.plan.may_raise else None):
         if places is not None:
             restoring.put(world, initial, places)
-        advance(world, wrenches, found, steps, dt, every)
+        advance(world, wrenches, found._as_room(), steps, dt, every)
     return found
 
 
