@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from physics.undo import Undo
+from rigid_env.tasks.task_parts import Stepped
 
 
 class Before:
@@ -12,10 +13,10 @@ class Before:
 
     Parameters
     ----------
-    task : Task
+    task : Stepped
     """
 
-    def __init__(self, task):
+    def __init__(self, task: Stepped):
         self._task, world = task, task.world
         disturbed = () if task.disturbed is None else task.disturbed.arrays.values()
         changing = [world.state, world.memory, world.report_table, world.sleep, task.action, task.previous_action,
