@@ -28,7 +28,8 @@ CALLED = (
 )
 """Decorators under which a function is called by its name, and by nobody else."""
 
-EXCEPTIONS = {"_turned_scene", "_half_turn"}  # of hard cases
+EXCEPTIONS = {"_turned_scene", "_half_turn"}
+"""Of hard cases: their last parameters are of no use, and may go."""
 
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
