@@ -20,10 +20,10 @@ from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.camera_argument import CameraArgument
 from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
 from rigid_env.tasks import Task
-from rigid_env.tasks.actions import shaped
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
 from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.task import shaped
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
 

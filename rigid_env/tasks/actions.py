@@ -7,13 +7,11 @@ Limits are told in units of the weight m g of the body, so that a task means the
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from physics import validation
 from physics.annotations import Frame
@@ -209,24 +207,6 @@ def check_axes(field: str, axes) -> None:
     """Raise a ValueError unless `axes` are some of "xyz", in this order."""
     if not isinstance(axes, str) or not axes or axes != "".join(axis for axis in AXES if axis in axes):
         raise ValueError(f"{field} is {axes!r}; allowed are axes of 'xyz', in this order")
-
-
-def shaped(given: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Return actions as an array of this shape.
-
-    Raises
-    ------
-    ValueError
-        Parts of different lengths, or another shape; tells the argument's `name`.
-    """
-    try:
-        array = np.asarray(given)
-    except ValueError:  # parts of different lengths
-        raise ValueError(f"{name} is {reprlib.repr(given)}; allowed is shape {shape}") from None
-    if array.shape != shape:
-        shown = f" ({reprlib.repr(array.item())})" if array.ndim == 0 else ""
-        raise ValueError(f"{name} has shape {array.shape}{shown}; allowed is shape {shape}")
-    return array
 
 
 class ActionTable:

@@ -19,7 +19,7 @@ from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.actions import ActionTable, shaped
+from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
@@ -373,3 +373,21 @@ class Task(Starts):
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
         compiled_task: Any = self.compiled
         return bound_alike(None, compiled_task, *arguments)
+
+
+def shaped(given: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Return actions as an array of this shape.
+
+    Raises
+    ------
+    ValueError
+        Parts of different lengths, or another shape; tells the argument's `name`.
+    """
+    try:
+        array = np.asarray(given)
+    except ValueError:  # parts of different lengths
+        raise ValueError(f"{name} is {reprlib.repr(given)}; allowed is shape {shape}") from None
+    if array.shape != shape:
+        shown = f" ({reprlib.repr(array.item())})" if array.ndim == 0 else ""
+        raise ValueError(f"{name} has shape {array.shape}{shown}; allowed is shape {shape}")
+    return array
