@@ -24,7 +24,7 @@ from physics.analysis.diagnostics import diagnose
 from physics.html_table import parts_table
 from physics.io.toml import from_toml, to_toml
 from physics.kernels.compile.cache_folder import folder_name
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED
+from physics.kernels.compile.compiler_choice import COMPILER, FUSED, round_alike
 from physics.kernels.state import layout as at
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
@@ -261,8 +261,7 @@ class Replay:
 
         A number x of a state may differ by the tolerance times (1 + |x|).
         """
-        makers = {self.recording.origin["compiler"], COMPILER}
-        return OTHER_COMPILER if FUSED in makers and len(makers) > 1 else 0.0
+        return 0.0 if round_alike(self.recording.origin["compiler"], COMPILER) else OTHER_COMPILER
 
     @property
     def first_difference(self) -> int | None:

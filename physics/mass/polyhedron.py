@@ -78,11 +78,6 @@ class Polyhedron:
         """Radius of the bounding sphere about the centre of mass [m]."""
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
-    @property
-    def triangles(self) -> np.ndarray:
-        """(t, 3) int64: the faces cut into triangles that fan out from their first corners, counter-clockwise."""
-        return np.array([(loop[0], *pair) for loop in self.loops for pair in pairwise(loop[1:])])
-
     def inertia(self, mass: float) -> np.ndarray:
         """(3, 3) tensor about the centre of mass [kg m²]."""
         S = self.second_moment

@@ -8,22 +8,16 @@ import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED
 from physics.kernels.compile.decorators import backend
 
-if COMPILER == FUSED:
-    from physics.kernels.compile.fused.ablation import is_on
+if backend.PREPARES_CALLS:
     from physics.parallel.prepared_work import PreparedWork as Work
-    from physics.parallel.prepared_work import entry
+    from physics.parallel.prepared_work import entry, loop_kernel, perform_all
 else:
     from physics.parallel.direct_work import DirectWork as Work
-    from physics.parallel.direct_work import entry
+    from physics.parallel.direct_work import entry, loop_kernel, perform_all
 
-# Allocations between two runs of the garbage collector while something is compiled; 0: none. What `numba` leaves behind
-# would take half a gigabyte, what `fused` does hardly anything.
-COLLECT_AT = (100_000, 50, 50)
-if COMPILER == FUSED:
-    COLLECT_AT = (0, 0, 0) if is_on("paused_gc") else gc.get_threshold()
+__all__ = ["Work", "bound", "bound_alike", "compiled", "compiled_entry", "compiling", "loop_kernel", "perform_all"]
 
 # Seconds after which the first step of a plan says that it is compiling.
 COMPILE_NOTICE = 1.0
@@ -79,7 +73,7 @@ def compiling():
     timer.daemon = True
     before = gc.get_threshold()
     timer.start()
-    gc.set_threshold(*COLLECT_AT)
+    gc.set_threshold(*backend.COLLECT_AT)
     try:
         yield
     finally:

@@ -7,18 +7,37 @@ from collections.abc import Callable
 from physics.kernels.compile.decorators import backend
 
 
+def loop_kernel(function: Callable) -> Callable:
+    """Leave a loop that makes calls to Python."""
+    return function
+
+
+def perform_all(work: DirectWork, count: int) -> bool:
+    """Make all calls, whatever their `count`; False, or the exception that one raised."""
+    return work.perform()
+
+
 class DirectWork:
     """Calls of kernels with all their arguments.
 
     Parameters
     ----------
     calls : list of (callable, tuple)
-        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents
-        at its time.
+        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: a call reads
+        their contents at its time.
+
+    Attributes
+    ----------
+    handed : tuple
+        Arguments of `perform_all` for these calls.
     """
 
     def __init__(self, calls: list[tuple[Callable, tuple]]):
         self._calls = [(code, list(arguments)) for code, arguments in calls]
+
+    @property
+    def handed(self) -> tuple[DirectWork, int]:
+        return self, len(self._calls)
 
     def perform(self) -> bool:
         """Make the calls until one raises an exception, which leaves this function, too. Returns False."""
@@ -44,5 +63,5 @@ class DirectWork:
 
 
 def entry(kernel: Callable, arguments: tuple) -> Callable:
-    """Machine code of a kernel for arguments of these types, compiled where it is not yet."""
-    return backend.machine_code(kernel, arguments)
+    """Machine code of a kernel for arguments of these types, compiled where it is not yet; a `loop_kernel` as it is."""
+    return backend.machine_code(kernel, arguments) if backend.is_kernel(kernel) else kernel

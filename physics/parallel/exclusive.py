@@ -3,20 +3,66 @@
 A world lends its arrays to machine code, which runs without the interpreter's lock: two steps at once would write to
 the same memory. A thread that comes while another one is at it gets an error.
 
-The flag `is_free` is tested and set in two bytecodes between which CPython (3.10 to 3.13) never switches threads: the
-branch that is not taken has neither a call nor a jump. It is written out where it is used, since a signal that arrives
-while a function of ours is called or has returned would leave it set. A lock of `threading` takes a tenth of a step.
+Both are `Exclusive`. A method that `exclusive` decorates begins and ends with the lines that are written there. Where
+the call of a decorator is too slow they stand in the method: `Stepper.__call__`, `World.step`, `RigidEnv.step`.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import weakref
 from functools import wraps
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from physics.annotations import Function
+
+
+class _Flag:
+    """Thing for one thread at a time, where the interpreter has a lock.
+
+    CPython (3.10 to 3.13) never switches threads between the two bytecodes that test and set `is_free`, nor does it
+    handle a signal there: the branch that is not taken has neither a call nor a jump. A lock of `threading` takes a
+    tenth of a step.
+    """
+
+    is_free = True
+
+    @property
+    def is_in_use(self) -> bool:
+        """True while a thread is at it."""
+        return not self.is_free
+
+
+class _Entry:
+    """Thing for one thread at a time, where the interpreter has no lock: who asks `is_free`, and is told so, has it.
+
+    `dict.setdefault` is one operation, of which one thread is the first.
+    """
+
+    @property
+    def is_free(self) -> bool:
+        """True for the one thread that has the thing from now on, until it sets this to True again."""
+        mine = object()
+        return vars(self).setdefault("_user", mine) is mine
+
+    @is_free.setter
+    def is_free(self, value: bool) -> None:
+        if value:
+            vars(self).pop("_user", None)
+
+    @property
+    def is_in_use(self) -> bool:
+        """True while a thread is at it."""
+        return "_user" in vars(self)
+
+
+HAS_LOCK = getattr(sys, "_is_gil_enabled", lambda: True)()
+if TYPE_CHECKING or HAS_LOCK:
+    Exclusive = _Flag
+else:
+    Exclusive = _Entry
 
 
 def exclusive(method: Function) -> Function:
@@ -25,7 +71,7 @@ def exclusive(method: Function) -> Function:
     Parameters
     ----------
     method : Callable
-        Its first argument has an attribute `is_free`, True at first, and may have `telling` (`World`).
+        Its first argument is `Exclusive`, and may have `telling` (`World`).
 
     Returns
     -------
@@ -74,7 +120,7 @@ def watch(world: Any) -> None:
 def _after_fork() -> None:
     """Unlock all worlds in a child process: the parent's threads inside a step do not exist there."""
     for world in list(_WORLDS):
-        world.is_torn = not world.is_free and world.telling != threading.get_ident()
+        world.is_torn = world.is_in_use and world.telling != threading.get_ident()
 
 
 if hasattr(os, "register_at_fork"):

@@ -10,7 +10,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from physics.kernels.compile.decorators import backend
+from physics.kernels.compile.decorators import backend, kernel
 from physics.kernels.compile.fused.prepared_calls import (
     JOB_ARGUMENTS,
     JOB_ENTRY,
@@ -19,6 +19,8 @@ from physics.kernels.compile.fused.prepared_calls import (
     JOB_STATUS,
 )
 from physics.kernels.parallel.prepared_calls import reraise, run_job, run_jobs
+
+loop_kernel, perform_all = kernel, run_jobs  # decorator of a loop that makes calls, and how it makes those it is handed
 
 
 class PreparedWork:
@@ -38,6 +40,8 @@ class PreparedWork:
         Address of the table of these calls, and their number: what `physics.kernels.parallel.prepared_calls` is told.
     perform : callable
         Makes the calls; whether one raised something, which `reraise` raises.
+    handed : tuple
+        Arguments of `perform_all` for these calls.
     """
 
     def __init__(self, calls: list[tuple[int, tuple]], words: list[np.ndarray] | None = None):
@@ -48,7 +52,7 @@ class PreparedWork:
         self._table = np.zeros((len(calls), JOB_SIZE), dtype=np.int64)
         self._table[:, JOB_ENTRY] = [entry for entry, _ in calls]
         self._table[:, JOB_ARGUMENTS] = [words.ctypes.data for words in self._words]
-        self.jobs, self.count = self._table.ctypes.data, len(calls)
+        self.handed = self.jobs, self.count = self._table.ctypes.data, len(calls)
         if self.count == 1:
             self.perform = partial(_performing_one(), self.jobs)
         else:

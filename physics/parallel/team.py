@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED
+from physics.kernels.compile.decorators import backend
 from physics.kernels.parallel import work_stealing as at
 
-if COMPILER == FUSED:
+if backend.PREPARES_CALLS:
     from physics.parallel.thread_team import Team
 else:
     from physics.parallel.thread_pool import Pool as Team

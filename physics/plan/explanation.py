@@ -98,7 +98,7 @@ def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
     return rows + [Row(kind().label, False, "not declared", "") for kind in FIELDS if kind not in declared]
 
 
-def _tangential_row(scene, contact, laws) -> Row:
+def _tangential_row(contact, laws) -> Row:
     if contact is None or contact.tangential is None:
         return Row("tangential restitution", False, "not declared", "")
     if LAW_TANGENTIAL not in laws:
@@ -158,7 +158,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
         _between_row(scene, contact, needs.meeting),
         _friction_row(friction, rubbing),
         _restitution_row(contact, touching),
-        _tangential_row(scene, contact, needs.laws),
+        _tangential_row(contact, needs.laws),
         _compliance_row(contact, needs.laws),
         _resistance_row(scene, RollingFriction, LAW_ROLLING, needs.laws),
         _resistance_row(scene, SpinFriction, LAW_SPIN, needs.laws),

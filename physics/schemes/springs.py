@@ -10,7 +10,7 @@ from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
 from physics.kernels.time_stepping.spring_coupled_step import make_linked_world, step_linked
 from physics.scene.needs import Needs
 from physics.scene.scene import Scene
-from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
+from physics.schemes.scheme import Scheme, Switches, Worlds, records
 from physics.schemes.wall_memory import WallMemory
 
 
@@ -35,7 +35,10 @@ class LinkedBodies(Scheme):
         return needs.linked and not needs.touching and is_precise == self.is_error_controlled
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
-        return make_linked_world(len(scene.bodies), switches.terms, **settings(accuracy))
+        return make_linked_world(
+            len(scene.bodies), switches.terms, relative_slop=accuracy.slop, tolerance=accuracy.tolerance,
+            splits=accuracy.impacts,
+        )  # fmt: skip
 
     def arguments(self, worlds: Worlds, k: int) -> tuple:
         held, extrapolates = (None, True) if self.is_error_controlled else (True, None)

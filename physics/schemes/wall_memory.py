@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.compiler_choice import COMPILER, PYTHON
-from physics.kernels.compile.decorators import entry_kernel, kernel
+from physics.kernels.compile.decorators import backend, entry_kernel, kernel
 from physics.kernels.half_space.gap_queries import feature_point
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 from physics.kernels.state import layout as at
@@ -155,7 +154,7 @@ class WallMemory(ContactMemory):
         return bodies
 
     def copy(self, source: np.ndarray, target: np.ndarray) -> None:
-        if len(source) >= MANY_ROWS and COMPILER != PYTHON:
+        if len(source) >= MANY_ROWS and backend.MAKES_MACHINE_CODE:
             copy_wall_memory(source, target)
         else:
             target[...] = source

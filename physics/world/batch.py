@@ -13,9 +13,11 @@ from physics.accuracy import Accuracy
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.bound_call import Work
+from physics.parallel.exclusive import Exclusive
 from physics.parallel.team import Team
 from physics.plan.plan import Plan
 from physics.scene.effects import Actuator, Sleeping
+from physics.scene.field_errors import raised
 from physics.scene.scene import Scene
 from physics.world.snapshot import KEPT
 from physics.world.step_listener import StepListener
@@ -50,7 +52,7 @@ class ActuatorState(Protocol):
         """Drop all commands that these worlds were given."""
 
 
-class Batch:
+class Batch(Exclusive):
     """Many worlds of one scene as arrays.
 
     Attributes
@@ -95,8 +97,8 @@ class Batch:
         What is told of every step; see `physics.Recorder`.
     telling : int or None
         The thread that tells the recorder of its step.
-    is_free : bool
-        Whether no thread is in a method that changes or copies the world. Such a method raises RuntimeError while
+    is_in_use : bool
+        Whether a thread is in a method that changes or copies the world. Such a method raises RuntimeError while
         another thread is in one: a world belongs to one thread at a time.
     is_torn : bool
         Whether another thread was in one when this process was forked.
@@ -132,7 +134,6 @@ class Batch:
     motions: list
     recorder: StepListener | None
     telling: int | None
-    is_free: bool
     is_torn: bool
 
     if TYPE_CHECKING:  # of `World`
@@ -142,10 +143,19 @@ class Batch:
     def make(self, calls: list[Work], duration: float) -> None:
         """Make the kernel calls of a time [s]."""
         if self.plan.fields:
-            for scratch in self.scratch:
-                body_records(scratch)["call_start"] = self.time
-        self.team.run(calls)
+            self._make_with_fields(calls)
+        else:
+            self.team.run(calls)
         self.time += duration
+
+    def _make_with_fields(self, calls: list[Work]) -> None:
+        """Tell fields the time, and make the calls; an exception of a field then names its class."""
+        for scratch in self.scratch:
+            body_records(scratch)["call_start"] = self.time
+        try:
+            self.team.run(calls)
+        except Exception as error:
+            raise raised(error, self.plan.fields)  # noqa: B904 (it has a cause already)
 
     def no_wrench(self) -> NDArray[np.float64]:
         """Zeros (worlds, bodies, 6) float64 for wrenches."""

@@ -10,6 +10,7 @@ from physics import validation
 from physics.kernels.state import layout as at
 from physics.scene.needs import is_isotropic
 from physics.summary import shown
+from physics.undo import Undo
 from physics.world import choice
 from physics.world.batch import Batch
 from physics.world.file_numbers import check_numbers
@@ -98,6 +99,12 @@ def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
         world.time = snapshot.time
     if world.recorder is not None:
         world.recorder.changed(where)
+
+
+def remember(world: Batch) -> Undo:
+    """Copy a batch; to put it back is to restore it."""
+    before = take(world, None, None)
+    return lambda: put(world, before, Places(None, None, True))
 
 
 def _put_actuation(world: Batch, snapshot: Snapshot, at_places: Places) -> None:

@@ -14,9 +14,10 @@ from physics.kernels.state import layout as at
 from physics.keywords import known_keywords
 from physics.parallel.exclusive import exclusive
 from physics.summary import parts_repr, shown
+from physics.undo import undo_on_error
 from physics.world import batch_arrays, restoring
 from physics.world.report import StepReport
-from physics.world.rollout_course import advance
+from physics.world.rollout_course import Room, advance
 from physics.world.snapshot import Snapshot
 from physics.world.world import World
 
@@ -71,6 +72,9 @@ class Rollout:
         """Memory of the arrays [bytes]."""
         arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
         return sum(array.nbytes for array in arrays)
+
+    def _as_room(self) -> Room:
+        return Room({name: getattr(self, name) for name in self.columns}, self.times, self.report_table)
 
     __repr__ = parts_repr
     _repr_html_ = parts_table
@@ -163,15 +167,10 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
     }
     places = None if initial is None else restoring.places(world, initial, None, None)
     found = _room(world, shapes) if out is None else _checked(out, world.names, shapes)
-    before = restoring.take(world, None, None) if world.plan.may_raise else None
-    try:
+    with undo_on_error(restoring.remember(world) if world.plan.may_raise else None):
         if places is not None:
             restoring.put(world, initial, places)
-        advance(world, wrenches, found, steps, dt, every)
-    except Exception:
-        if before is not None:
-            restoring.put(world, before, restoring.Places(None, None, True))
-        raise
+        advance(world, wrenches, found._as_room(), steps, dt, every)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,13 +14,18 @@ from physics.world.rollout_loop import RolloutLoop
 from physics.world.rollout_steps import Course, Follow, Samples, begin_moment, end_moment
 from physics.world.stepper import kernel_calls, takes_each_step
 
-if TYPE_CHECKING:
-    from physics.world.rollout import Rollout
-
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
-def advance(world: Batch, wrenches: np.ndarray, into: Rollout, steps: int, dt: float, every: int) -> None:
+class Room(NamedTuple):
+    """Arrays that a rollout is written into."""
+
+    columns: dict[str, np.ndarray]  # (worlds, samples, bodies, 3|4|3|3) of those to keep, by name as in `Samples`
+    times: np.ndarray  # (samples,) [s]
+    report_table: np.ndarray  # (worlds, REPORT_SIZE)
+
+
+def advance(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt: float, every: int) -> None:
     """Take `steps` steps of `dt` [s] with each of the wrenches (worlds, length, bodies, 6), and keep states.
 
     Every `every` wrenches they go to `into`.
@@ -39,7 +44,7 @@ def _needs_python(world: Batch, steps: int) -> bool:
     return world.actuation.actuator.delay > 0.0 or (steps > 1 and takes_each_step(world))
 
 
-def _one_by_one(world: Batch, wrenches, into: Rollout, steps: int, dt: float, every: int) -> None:
+def _one_by_one(world: Batch, wrenches, into: Room, steps: int, dt: float, every: int) -> None:
     wrench = world.no_wrench()
     calls = kernel_calls(world, wrench, steps, dt)
     for k in range(wrenches.shape[1]):
@@ -49,17 +54,15 @@ def _one_by_one(world: Batch, wrenches, into: Rollout, steps: int, dt: float, ev
         if (k + 1) % every == 0:
             place = (k + 1) // every - 1
             into.times[place] = world.time
-            for name in into.columns:
-                getattr(into, name)[:, place] = getattr(world, name)
+            for name, array in into.columns.items():
+                array[:, place] = getattr(world, name)
 
 
-def _all_at_once(world: Batch, wrenches, into: Rollout, steps: int, dt: float, every: int) -> None:
+def _all_at_once(world: Batch, wrenches, into: Room, steps: int, dt: float, every: int) -> None:
     held = world.no_wrench()
     applied = held if world.actuation is None else world.actuation.applied
     course = Course(wrenches, applied.reshape(-1, 6), _follow(world, dt))
-    samples = Samples(*(NOTHING if array is None else array
-                        for array in (into.pos, into.quat, into.linvel, into.angvel)))  # fmt: skip
-
+    samples = Samples(*(into.columns.get(name, NOTHING) for name in Samples._fields))
     loop = RolloutLoop(world, held, steps, dt)
     arrays = (world.state, world.report_table, into.report_table, samples)
     before = [bound_alike(course.follow is None, begin_moment, moment, course) for moment in loop.moments]

@@ -11,25 +11,14 @@ from typing import NoReturn
 
 import numpy as np
 
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED
-from physics.kernels.compile.decorators import kernel
 from physics.kernels.parallel import work_stealing
 from physics.kernels.parallel.work_stealing import RANGE_CHUNK, RANGE_END, TAKEN_CHUNK_END, begin_taking, take_chunk
 from physics.kernels.state.groups import WorkQueue
 from physics.kernels.time_stepping.workspace import body_records
-from physics.parallel.bound_call import Work, bound_alike
+from physics.parallel.bound_call import Work, bound_alike, loop_kernel, perform_all
 from physics.scene.field_errors import raised
 from physics.world.batch import Batch
 from physics.world.stepper import kernel_calls
-
-if COMPILER == FUSED:
-    from physics.kernels.parallel.prepared_calls import run_jobs as perform_all
-else:
-
-    def perform_all(work, _count):
-        """Make prepared calls; return False, or the exception of one."""
-        return work.perform()
-
 
 # Worlds that a thread steps through all of time before the next ones: few enough for the cache of a processor, and
 # enough that the calls are a small part of the step.
@@ -39,6 +28,7 @@ BLOCK = 8
 FIRST, END, STEP, MOMENT_SIZE = range(4)
 
 
+@loop_kernel
 def roll_out(outer, inner, block, starts, clock, moment, calls, count):
     """Take all steps of the worlds that no other thread has taken, a block at a time.
 
@@ -56,8 +46,8 @@ def roll_out(outer, inner, block, starts, clock, moment, calls, count):
         Time that the fields of this thread read [s]; (0,) without fields.
     moment : (MOMENT_SIZE,) int64, out
         Where it is: what the calls besides that of the step kernel read.
-    calls, count : int
-        Address of the table of prepared calls of one step, and their number; without `fused` their `Work`.
+    calls, count
+        Calls of one step: what `Work.handed` gives.
     """
     begin_taking(outer.turns, outer.taken)
     while True:
@@ -77,10 +67,6 @@ def roll_out(outer, inner, block, starts, clock, moment, calls, count):
                     clock[record] = starts[k]
                 if perform_all(calls, count):
                     return
-
-
-if COMPILER == FUSED:
-    roll_out = kernel(roll_out)
 
 
 class RolloutLoop:
@@ -139,7 +125,7 @@ class RolloutLoop:
         np.add.accumulate(times, out=times)  # as times add up step by step
         chains = [first.then(step).then(last) for first, step, last in zip(before, self._stepping, after, strict=True)]
         loops = [
-            _prepared((outer, inner, BLOCK, times[:-1], _clock(world, k), self.moments[k]), chains[k])
+            _bound((outer, inner, BLOCK, times[:-1], _clock(world, k), self.moments[k], *chains[k].handed))
             for k, (outer, inner) in enumerate(zip(world.team.queues, self._inner, strict=True))
         ]
         try:
@@ -161,20 +147,5 @@ def _clock(world: Batch, k: int) -> np.ndarray:
     return np.atleast_1d(body_records(world.scratch[k])["call_start"]) if world.plan.fields else np.zeros(0)
 
 
-class _Loop:
-    """`roll_out` as a Python function, for a thread of a pool."""
-
-    def __init__(self, arguments: tuple):
-        self._arguments = arguments
-
-    def perform(self) -> bool:
-        """Run the loop; raise the exception of a step."""
-        roll_out(*self._arguments)
-        return False
-
-
-def _prepared(arguments: tuple, chain: Work):
-    if COMPILER != FUSED:
-        return _Loop((*arguments, chain, 0))
-    arguments = (*arguments, chain.jobs, chain.count)
+def _bound(arguments: tuple) -> Work:
     return bound_alike(arguments[4].flags.c_contiguous, roll_out, *arguments)

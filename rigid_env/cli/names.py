@@ -53,13 +53,6 @@ def complete_scene(incomplete: str) -> list[str]:
     return [*_starting(incomplete, scenes.SCENES), *_scene_files(incomplete)]
 
 
-def complete_canonical(incomplete: str) -> list[str]:
-    """Canonical scenes that begin like this."""
-    from physics import scenes
-
-    return _starting(incomplete, scenes.SCENES)
-
-
 def complete_preset(incomplete: str) -> list[str]:
     """Presets that begin like this."""
     from physics import PRESETS

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import reprlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +10,8 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from physics.parallel.exclusive import exclusive, in_use
+from physics.parallel.exclusive import Exclusive, exclusive, in_use
+from physics.undo import Undo, undo_on_error
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
@@ -23,11 +23,12 @@ from rigid_env.tasks import Task
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
 from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.task import shaped
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
 
 
-class RigidEnv(gym.Env[Obs, NDArray[Any]]):
+class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters
@@ -58,7 +59,6 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}  # noqa: RUF012
-    is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
 
     def __init__(
         self,
@@ -111,15 +111,11 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         TypeError, ValueError
             An option that is unknown or out of range. Nothing has changed then, the generator included.
         """
-        kept = self._np_random, self._np_random_seed, self.task.generators[0]
-        try:
+        with undo_on_error(self._remember_generator()):
             super().reset(seed=seed)
             self.task.generators[0] = self.np_random
             self.task.start(self._world, options)
             self._source.start(self._world)
-        except BaseException:
-            self._np_random, self._np_random_seed, self.task.generators[0] = kept
-            raise
         self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
@@ -127,6 +123,14 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         drawn = {name: value_of(values[name][0]) for name in self.task.own_draws}
         info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
         return self._source.one(0), {**info, **drawn}
+
+    def _remember_generator(self) -> Undo:
+        kept = self._np_random, self._np_random_seed, self.task.generators[0]
+
+        def put_back() -> None:
+            self._np_random, self._np_random_seed, self.task.generators[0] = kept
+
+        return put_back
 
     def step(self, action: ArrayLike) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; see `gymnasium.Env.step`.
@@ -160,16 +164,8 @@ class RigidEnv(gym.Env[Obs, NDArray[Any]]):
         try:
             if not self._has_reset:
                 raise self._not_ready("step")
-            try:
-                action = np.asarray(action)
-            except ValueError:  # parts of different lengths
-                allowed = f"{self.task.action_size} numbers"
-                raise ValueError(f"action is {reprlib.repr(action)}; allowed are {allowed}") from None
-            if action.shape != self._action_shape:
-                shown = f" ({reprlib.repr(action.item())})" if action.ndim == 0 else ""
-                raise ValueError(f"action has shape {action.shape}{shown}; allowed is shape {self._action_shape}")
             task = self.task
-            task.take(action)
+            task.take(shaped(action, self._action_shape, "action"))
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":

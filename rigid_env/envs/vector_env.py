@@ -11,7 +11,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from physics.parallel.exclusive import exclusive
+from physics.parallel.exclusive import Exclusive, exclusive
+from physics.undo import Undo, undo_on_error
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
 from rigid_env.envs.attributes import BatchAttributes
@@ -25,13 +26,13 @@ from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.state import TaskState, put, remember, take
 
 Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminations, truncations and infos of one control step."""
 
 
-class RigidVectorEnv(BatchAttributes[Obs]):
+class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
@@ -58,7 +59,6 @@ class RigidVectorEnv(BatchAttributes[Obs]):
     """
 
     task: Task
-    is_free = True  # no thread is in a call: of `physics.parallel.exclusive`
     _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
 
     def __init__(
@@ -145,15 +145,11 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         mask = arguments.reset_mask(options, self.num_envs)
         seeds = arguments.seed_list(seed, self.num_envs)
         rows = np.flatnonzero(mask)
-        kept = list(self.task.generators), list(self._seeds)
-        try:
+        with undo_on_error(self._remember_generators()):
             for i in rows.tolist():
                 if seeds[i] is not None or self.task.generators[i] is None:
                     self._seeds[i] = self.task.seed(i, seeds[i])
             self._begin(rows, options)
-        except BaseException:
-            self.task.generators[:], self._seeds[:] = kept
-            raise
         self._waiting[rows] = False
         self._show()
         infos = vector_infos.of_outcomes(self.task, mask, self.contact_infos)
@@ -187,19 +183,13 @@ class RigidVectorEnv(BatchAttributes[Obs]):
             Actions of another shape, or that are not finite numbers. Nothing has changed then.
         """
         self._check_ready()
-        before = self._ended, self._kept_pictures()
+        put_back_memory = self._remember()
         kept = self._generators_of_ended()
         self.task.step(actions)
         for generator, state in kept:
             generator.bit_generator.state = state
-        try:
+        with undo_on_error(self.task.take_back, put_back_memory):  # an error of a start, or of a picture
             return self._conclude()
-        except BaseException:  # of a start, or of a picture: this step has not been
-            if self.task.may_fail:
-                self.task.take_back()
-                self._ended = before[0]
-                self._put_pictures(before[1])
-            raise
 
     def _conclude(self) -> Step[Obs]:
         """Observe a step that was taken, and start episodes after those that ended."""
@@ -306,26 +296,33 @@ class RigidVectorEnv(BatchAttributes[Obs]):
         ended: Any = [self.task.generators[world] for world in np.flatnonzero(self._ended).tolist()]
         return [(generator, generator.bit_generator.state) for generator in ended]
 
-    def _kept_pictures(self) -> dict[str, np.ndarray]:
-        """Copies of the source's memory, where code of a user may end with an error."""
-        return {name: array.copy() for name, array in self._source.arrays.items()} if self.task.may_fail else {}
+    def _remember_generators(self) -> Undo:
+        kept = list(self.task.generators), list(self._seeds)
 
-    def _put_pictures(self, kept: dict[str, np.ndarray]) -> None:
-        for name, array in kept.items():
-            self._source.arrays[name][...] = array
+        def put_back() -> None:
+            self.task.generators[:], self._seeds[:] = kept
+
+        return put_back
+
+    def _remember(self) -> Undo | None:
+        """Copy the environment's own memory, where code of a user may end with an error."""
+        if not self.task.may_fail:
+            return None
+        ended, pictures = self._ended, {name: array.copy() for name, array in self._source.arrays.items()}
+
+        def put_back() -> None:
+            self._ended = ended
+            for name, array in pictures.items():
+                self._source.arrays[name][...] = array
+
+        return put_back
 
     def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
         """Start episodes; after an error nothing has changed."""
-        pictures = self._kept_pictures()
-        before = take(self.task, {}, self._seeds, rows) if pictures else None
-        self.task.start(rows, options)
-        try:
+        put_back_task = remember(self.task, rows) if self.task.may_fail and self._source.arrays else None
+        with undo_on_error(put_back_task, self._remember()):
+            self.task.start(rows, options)
             self._source.start(rows)
-        except BaseException:
-            if before is not None:
-                put(self.task, {}, before, rows)
-                self._put_pictures(pictures)
-            raise
         self._ended[rows] = False
 
     # --- pictures -----------------------------------------------------------------------------------------

@@ -113,7 +113,7 @@ class Stage:
         to be shown whole, the picture is without walls and travels with body 0.
         """
         matrix, scale = self._matrix, self._scale
-        bodies = [self._placed(body, matrix) for body in frame.bodies]
+        bodies = [self._placed(body) for body in frame.bodies]
         walls = [self._wall(wall) for wall in frame.walls] if self._path is None else self._ground
         points, forces = scale * (frame.contact_points @ matrix.T - self._shift), frame.contact_forces @ matrix.T
         if self._travels:
@@ -147,7 +147,7 @@ class Stage:
         eye, target = tuple(eye.tolist()), tuple(target.tolist())
         return as_camera(Camera(eye, target, upwards(eye, target)))
 
-    def _placed(self, body: BodyView, matrix: np.ndarray) -> BodyView:
+    def _placed(self, body: BodyView) -> BodyView:
         scale = self._body_scale
         corners = {} if body.corners is None else {"corners": scale * np.asarray(body.corners)}
         return replace(

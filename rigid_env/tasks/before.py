@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.undo import Undo
+from rigid_env.tasks.task_parts import Stepped
+
 
 class Before:
     """Arrays for a copy of all that a control step changes.
 
     Parameters
     ----------
-    task : Task
+    task : Stepped
     """
 
-    def __init__(self, task):
+    def __init__(self, task: Stepped):
         self._task, world = task, task.world
         disturbed = () if task.disturbed is None else task.disturbed.arrays.values()
         changing = [world.state, world.memory, world.report_table, world.sleep, task.action, task.previous_action,
@@ -24,8 +27,8 @@ class Before:
         self._time, self._clock, self._actuation = 0.0, 0, None
         self._generators: dict[int, dict] = {}
 
-    def keep(self) -> None:
-        """Copy what the coming step changes."""
+    def keep(self) -> Undo:
+        """Copy what the coming step changes; returns `put_back`."""
         task = self._task
         for array, kept in self._kept:
             kept[...] = array
@@ -35,6 +38,7 @@ class Before:
         if task.disturbed is not None:
             due = task.disturbed.due().tolist()
             self._generators = {world: task.generators[world].bit_generator.state for world in due}
+        return self.put_back
 
     def put_back(self) -> None:
         """Restore the state at the last `keep`."""

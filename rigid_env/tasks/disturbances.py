@@ -16,6 +16,7 @@ import numpy as np
 from physics import validation
 from rigid_env.tasks.actions import check_axes, check_body
 from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.task_parts import Disturbed
 
 UNIFORMS = 5  # of one disturbance: direction (2), size (1), duration (1), wait (1)
 FAR = 2**53  # control steps after which nobody looks: larger numbers are cut
@@ -134,7 +135,7 @@ class Disturbances:
     Parameters
     ----------
     kinds : sequence of Push and Gust
-    task : Task
+    task : Disturbed
 
     Attributes
     ----------
@@ -153,7 +154,7 @@ class Disturbances:
         Something that is no disturbance, or a body that is not there.
     """
 
-    def __init__(self, kinds, task):
+    def __init__(self, kinds, task: Disturbed):
         self.kinds, self._task = tuple(kinds) if isinstance(kinds, (list, tuple)) else (kinds,), task
         for kind in self.kinds:
             if not isinstance(kind, (Push, Gust)):
@@ -210,7 +211,7 @@ class Disturbances:
             due = np.flatnonzero(self.next[k] <= steps)
             for world in due.tolist():
                 self._draw(k, kind, world, int(steps[world]))
-            if isinstance(kind, Push):
+            if push is not None and isinstance(kind, Push):
                 push[due, kind.body, :3] += self.force[k, due]
             else:
                 acting = self.end[k] > steps

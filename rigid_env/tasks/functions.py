@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from physics.undo import undo_on_error
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.named import Named
+from rigid_env.tasks.task_parts import Called
 from rigid_env.tasks.worlds import Worlds
 
 
@@ -21,7 +24,7 @@ class Functions:
 
     Parameters
     ----------
-    task : Task
+    task : Called
         Gets the names of its `measures` and `terms` by the first calls.
     is_first : bool
         False: the names are there, as in a copy.
@@ -32,7 +35,7 @@ class Functions:
         A function gives what it may not: names the function, the value and what is allowed.
     """
 
-    def __init__(self, task, is_first: bool = True):
+    def __init__(self, task: Called, is_first: bool = True):
         self.task, self._name = task, type(task).__name__
         self._entries = task.observed.entries
         unread = [entry.names[0] for entry in self._entries if entry.read is None]
@@ -79,7 +82,8 @@ class Functions:
         self._measure(worlds)
         task.begin(worlds)
         terms = self._look(worlds)
-        task.measures, task.terms = tuple(map(str, worlds.measured)), tuple(map(str, terms))
+        own: Any = task  # its own in place of its class's
+        own.measures, own.terms = tuple(map(str, worlds.measured)), tuple(map(str, terms))
         out = np.zeros((2, col.INFO + len(terms) + len(worlds.measured)))
         self._fill("measure", worlds.measured, task.measures, out, col.INFO)
         self._fill("rewards", terms, task.terms, out, col.INFO)
@@ -111,15 +115,11 @@ class Functions:
         task.given[...] = actions
         if not np.isfinite(task.given).all():
             raise task.not_finite(int(np.flatnonzero(~np.isfinite(task.given).all(axis=1))[0]))
-        self.before.keep()
-        try:
+        with undo_on_error(self.before.keep()):
             task.previous_action[...] = task.action
             np.clip(task.given, -1.0, 1.0, out=task.given)
             task.act()
             self._conclude()
-        except BaseException:  # of an interrupt, too
-            self.before.put_back()
-            raise
 
     def _conclude(self) -> None:
         task, worlds, outcome = self.task, self._all, self._outcome

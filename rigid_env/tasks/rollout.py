@@ -13,11 +13,12 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import bound_alike
 from physics.parallel.exclusive import exclusive
 from physics.summary import parts_repr
+from physics.undo import undo_on_error
 from physics.world.batch_arrays import machine_memory
 from physics.world.report import Status, gravest
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.rollout_steps import Kept, end_control
-from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.state import TaskState, put, remember
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.wrenches import begin_control
 
@@ -140,18 +141,14 @@ def rollout(
         raise ValueError(f"every is {every}; allowed are divisors of {length}, the number of actions of a world")
     validation.instance(observations, bool, "observations", "True or False")
     kept = _room(task, length, length // every if observations else 0, out)
-    before = take(task, {}, [None] * task.worlds) if task.compiled is None or task.world.plan.may_raise else None
-    if initial is not None:
-        put(task, {}, initial)
-    try:
+    may_raise = task.compiled is None or task.world.plan.may_raise
+    with undo_on_error(remember(task) if may_raise else None):
+        if initial is not None:
+            put(task, {}, initial)
         if _needs_python(task):
             status = _one_by_one(task, actions, every, kept)
         else:
             status = _all_at_once(task.world, task, actions, every, kept)
-    except BaseException:
-        if before is not None:
-            put(task, {}, before)
-        raise
     return TaskRollout(*kept[:3], kept.observations if observations else None, status, task.ends_on_success)
 
 

@@ -15,6 +15,7 @@ import physics
 from physics import validation
 from physics.kernels.state import layout as at
 from physics.parallel.team import listed
+from physics.undo import undo_on_error
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
@@ -23,7 +24,7 @@ from rigid_env.tasks.draws import parameter_of, world_arguments
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.parameters import DRAWN_LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
-from rigid_env.tasks.state import put, take
+from rigid_env.tasks.state import remember
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -103,15 +104,8 @@ class Starts(Declaration):
         options = require_known(options, self.option_names)
         chosen = {name: self.episodes.read(name, f"options {name}", options[name], len(rows)) for name in options}
         refuse_replaced(self.effects, chosen, "options ")
-        if not self.may_fail and not chosen:
+        with undo_on_error(remember(self, rows) if self.may_fail or chosen else None):
             self._start(rows, chosen)
-            return
-        before = take(self, {}, [None] * self.worlds, rows)
-        try:
-            self._start(rows, chosen)
-        except BaseException:
-            put(self, {}, before, rows)
-            raise
 
     def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
         shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])

@@ -15,6 +15,7 @@ import numpy as np
 import physics
 from physics import validation
 from physics.html_table import parts_table
+from physics.undo import Undo
 from physics.world import choice, restoring
 from physics.world.headed_file import FileKind, head_value, is_count, is_text
 from rigid_env.tasks.draws import parameter_of
@@ -248,6 +249,16 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
     task.episodes.varying.update(state.told)
     _put_generators(task.generators, state.generators, chosen.tolist(), sources.tolist())
     return chosen, sources
+
+
+def remember(task, rows: np.ndarray | None = None) -> Undo:
+    """Copy a task, some worlds or all: to put it back is to go on from there."""
+    before = take(task, {}, [None] * task.worlds, rows)
+
+    def put_back() -> None:
+        put(task, {}, before, rows)
+
+    return put_back
 
 
 def _indices(worlds: int, held: int, places: restoring.Places) -> tuple[np.ndarray, np.ndarray]:

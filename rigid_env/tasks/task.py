@@ -267,14 +267,7 @@ class Task(Starts):
             Actions of the wrong shape or not finite, or a function of the task that gives what it may not. Nothing has
             changed then.
         """
-        shape = self.action.shape
-        try:
-            actions = np.asarray(actions)
-        except ValueError:  # rows of different lengths
-            raise ValueError(f"actions is {reprlib.repr(actions)}; allowed is shape {shape}") from None
-        if actions.shape != shape:
-            raise ValueError(f"actions has shape {actions.shape}; allowed is shape {shape}")
-        self.take(actions)
+        self.take(shaped(actions, self.action.shape, "actions"))
 
     def take(self, actions: np.ndarray) -> None:
         """Take a `step` with an array of the right shape; the axis of a single world may be missing."""
@@ -380,3 +373,21 @@ class Task(Starts):
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
         compiled_task: Any = self.compiled
         return bound_alike(None, compiled_task, *arguments)
+
+
+def shaped(given: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Return actions as an array of this shape.
+
+    Raises
+    ------
+    ValueError
+        Parts of different lengths, or another shape; tells the argument's `name`.
+    """
+    try:
+        array = np.asarray(given)
+    except ValueError:  # parts of different lengths
+        raise ValueError(f"{name} is {reprlib.repr(given)}; allowed is shape {shape}") from None
+    if array.shape != shape:
+        shown = f" ({reprlib.repr(array.item())})" if array.ndim == 0 else ""
+        raise ValueError(f"{name} has shape {array.shape}{shown}; allowed is shape {shape}")
+    return array

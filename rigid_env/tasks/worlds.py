@@ -11,6 +11,7 @@ from physics.schemes.contacts import Contacts
 from physics.world.contacts import contact_rows, read_contacts, write_contact_forces, write_contact_impulses
 from rigid_env.tasks.named import Named
 from rigid_env.tasks.reading import write_rotations, write_wall_gaps
+from rigid_env.tasks.task_parts import Watched
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -44,7 +45,7 @@ class Worlds:
         Flags that the task's functions of these names gave; False before they did.
     """
 
-    def __init__(self, task, indices: np.ndarray | None = None):
+    def __init__(self, task: Watched, indices: np.ndarray | None = None):
         self._task, world = task, task.world
         self.is_all = indices is None
         self.indices: Any = np.arange(task.worlds) if indices is None else indices

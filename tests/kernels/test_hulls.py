@@ -16,6 +16,7 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.plan.plan import SHAPE_CODES
+from physics.scene.polyhedra import polyhedra as polyhedra_of
 from physics.world import parameters
 from tests.kernels.called import called
 from tests.reference import polyhedra, separation
@@ -34,7 +35,7 @@ seeds = st.integers(0, 2**32 - 1)
 def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     """(workspace, number of contacts) of bodies at rest at `places` with these attitudes (n, 3, 3)."""
     walls = parameters.wall_table(walls)
-    many = make_bodies_workspace(len(bodies), walls, (), parameters.polyhedra(bodies), **SETTINGS)
+    many = make_bodies_workspace(len(bodies), walls, (), polyhedra_of(bodies), **SETTINGS)
     many.bodies.work["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
     many.bodies.work["dims"] = [body.dimensions for body in bodies]
     many.bodies.work["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]

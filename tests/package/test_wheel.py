@@ -18,8 +18,6 @@ from tests.package import distributions
 from tests.package.distributions import Environment
 from tests.tosses.conftest import make_tosses
 
-needs_hatchling = pytest.mark.usefixtures("_hatchling")
-
 
 @pytest.fixture(scope="module")
 def _hatchling():

@@ -18,6 +18,7 @@ import pytest
 
 import physics
 from physics.parallel.bound_call import Work
+from physics.parallel.exclusive import _Entry, _Flag, exclusive
 from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
@@ -120,14 +121,14 @@ def test_a_world_is_free_after_an_error(monkeypatch):
     ):
         with pytest.raises(ValueError, match="allowed"):
             call()
-        assert world.is_free
+        assert not world.is_in_use
     prepared()
     with monkeypatch.context() as patch:
         patch.setattr(prepared, "_perform", lambda: True)
         patch.setattr(Work, "raise_again", lambda work: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             prepared()
-    assert world.is_free
+    assert not world.is_in_use
     prepared()
 
 
@@ -149,10 +150,10 @@ def test_a_recorder_may_take_snapshots_within_the_step():
 
 def test_a_copy_is_free_and_goes_on():
     world = ball()
-    assert {"is_free", "is_torn", "telling"}.isdisjoint(world.__getstate__())
+    assert {"is_free", "_user", "is_torn", "telling"}.isdisjoint(world.__getstate__())
     for twin in (copy.deepcopy(world), pickle.loads(pickle.dumps(world))):
         twin.step()
-        assert twin.is_free
+        assert not twin.is_in_use
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
@@ -171,7 +172,7 @@ def test_a_forked_child_does_not_inherit_the_other_thread(monkeypatch):
                     world.step()
                 world.restore(snapshot)
                 world.step()
-                code = 0 if np.array_equal(world.state, other.state) and world.is_free else 2
+                code = 0 if np.array_equal(world.state, other.state) and not world.is_in_use else 2
             finally:
                 os._exit(code)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
@@ -198,7 +199,7 @@ def test_ctrl_c_at_any_time_leaves_the_world_free(threads, prepared):
                     step()
             except KeyboardInterrupt:
                 count += 1
-            assert world.is_free
+            assert not world.is_in_use
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
@@ -232,6 +233,56 @@ def test_two_threads_in_an_environment(make, monkeypatch):
     thread.join(60)
     assert len(found) == 1
     env.step(action)
+
+
+@pytest.mark.parametrize("kind", [_Flag, _Entry])
+def test_one_of_many_threads_is_in_with_and_without_a_lock_of_the_interpreter(kind):
+    class Counted(kind):
+        inside = entered = 0
+
+        @exclusive
+        def enter(self):
+            self.inside += 1
+            assert self.inside == 1
+            self.entered += 1
+            self.inside -= 1
+
+    def go():
+        for _ in range(2000):
+            try:
+                thing.enter()
+            except RuntimeError:
+                refused.append(1)
+
+    thing, refused, before = Counted(), [], sys.getswitchinterval()
+    threads = [threading.Thread(target=go) for _ in range(8)]
+    sys.setswitchinterval(1e-6)
+    try:
+        for each in threads:
+            each.start()
+        for each in threads:
+            each.join()
+    finally:
+        sys.setswitchinterval(before)
+    assert thing.entered + len(refused) == 8 * 2000
+    assert not thing.is_in_use
+
+
+@pytest.mark.parametrize("kind", [_Flag, _Entry])
+def test_who_is_in_shuts_others_out_until_the_end(kind):
+    class Thing(kind):
+        @exclusive
+        def call(self):
+            assert self.is_in_use
+            with pytest.raises(RuntimeError, match="another thread"):
+                self.call()
+            raise ZeroDivisionError
+
+    thing = Thing()
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            thing.call()
+        assert not thing.is_in_use
 
 
 PROGRAM = """

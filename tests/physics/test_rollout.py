@@ -244,7 +244,7 @@ def test_errors_say_what_is_allowed_and_nothing_moves(name):
     for array, value in zip(world.kept(), before.kept()):
         np.testing.assert_array_equal(array, value)
     assert world.time == before.time
-    assert world.is_free
+    assert not world.is_in_use
 
 
 def test_what_the_memory_does_not_hold_is_refused(monkeypatch):
@@ -270,6 +270,7 @@ def test_it_is_shown_on_a_screen():
 
 def test_a_world_in_use_is_refused():
     world = blocks(3)
+    assert world.is_free
     world.is_free = False
     with pytest.raises(RuntimeError, match="World is being used by another thread"):
         physics.rollout(world, np.zeros((3, 2, 6)))

@@ -157,10 +157,6 @@ def test_it_is_shown_on_a_screen():
     assert "status OK" in text
 
 
-def wrong_state() -> TaskState:
-    return BlockReachEnv().get_state()
-
-
 def other_out() -> TaskRollout:
     return rollout(started(BlockReach(3)), np.zeros((3, 2, 6)))
 
@@ -194,7 +190,7 @@ def test_errors_say_what_is_allowed_and_nothing_moves(name):
     with pytest.raises(ValueError, match=f"(?s){message}"):
         call(task)
     assert_same_state(task, twin)
-    assert task.world.is_free
+    assert not task.world.is_in_use
 
 
 class Faulty(NumpyReach):
@@ -243,6 +239,7 @@ def test_what_the_memory_does_not_hold_is_refused(monkeypatch):
 
 def test_a_world_in_use_is_refused():
     task = started(BlockReach(3))
+    assert task.world.is_free
     task.world.is_free = False
     with pytest.raises(RuntimeError, match="World is being used by another thread"):
         rollout(task, np.zeros((3, 2, 6)))

@@ -164,7 +164,7 @@ def _wall(plane: Element) -> HalfSpace:
     return HalfSpace(wall.normal, float(np.array(wall.normal) @ _numbers(plane, "pos", 3, "0 0 0")))
 
 
-def _unit(element: Element, key: str = "quat") -> np.ndarray:
+def _unit(element: Element) -> np.ndarray:
     """The quaternion of an element, normalised: as in MuJoCo it may have any norm but zero."""
     return _normalised(element, _numbers(element, "quat", 4, "1 0 0 0"))
 

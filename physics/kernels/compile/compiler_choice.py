@@ -71,6 +71,11 @@ def choose_compiler(environment: Mapping[str, str], numba_version: str) -> tuple
     )
 
 
+def round_alike(one: str, other: str) -> bool:
+    """True if kernels of two compilers give the same bits."""
+    return one == other or FUSED not in (one, other)
+
+
 def _release(numba_version: str) -> tuple[int, ...]:
     """Major and minor number of a version."""
     return tuple(int(part) for part in numba_version.split(".")[:2] if part.isdigit())

@@ -96,12 +96,6 @@ def normal_lcp_sizes(n_max: int) -> tuple[int, int]:
     return rows * columns + n_max, integers
 
 
-def pivoting_workspace_sizes(n_max: int) -> tuple[int, int]:
-    """Lengths of `work` (float64) and `index` (int64) that serve either fallback."""
-    pyramid, normal = pyramid_sizes(n_max), normal_lcp_sizes(n_max)
-    return max(pyramid[0], normal[0]), max(pyramid[1], normal[1])
-
-
 @kernel
 def orient_pyramids(W, b, n, p, heading):
     """Direction d_0 of each contact into `heading` (n, 2): against u_t; if that vanishes, along p_t."""

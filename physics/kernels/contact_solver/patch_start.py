@@ -29,7 +29,7 @@ def warm_start_motion(n, patch, on, body, work):
 
 
 @inlined
-def warm_start_friction(n, patch, on, work):
+def warm_start_friction(n, on, work):
     """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
     p = on * gather_component(work.impulse, 0, n)
     s = select_lanes(p > 0.0, 1.0 / p, 0.0)

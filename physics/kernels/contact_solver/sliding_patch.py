@@ -288,7 +288,7 @@ def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
     """
     none = Lanes(0.0, 0.0, 0.0, 0.0)
     if is_mixed:
-        x, y = warm_start_friction(n, problem.patch, pushing.on, work)
+        x, y = warm_start_friction(n, pushing.on, work)
         current, pulling = PatchRound(ROUND_REVERSES, -1, none, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion), none
     else:
         current, pulling = _direction_newton_round(patient, pushing, problem, normal, motion, work)

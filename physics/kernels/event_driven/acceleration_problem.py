@@ -121,7 +121,7 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
     if has_sliding:
         small *= _SLIDING_ACCELERATION
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates)
+        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates)
         size = math.sqrt(qt.dot(at, at))
         push = work.impulse[width * i]
         if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * work.mass * scale:
@@ -138,7 +138,7 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
         for c in range(3):
             candidates.direction[i, c] = at[c] / size if size > small else 0.0
     store_solver_forces(count, width, work, motion.contacts)
-    activate_candidates(count, work, motion)
+    activate_candidates(count, motion)
     if has_closing_contact(count, motion):
         return MODE_IMPACT
     if motion.contacts.count == 0:

@@ -52,7 +52,7 @@ def find_candidates(y, offset_frame, work, motion):
 
 
 @kernel
-def activate_candidates(count, work, motion):
+def activate_candidates(count, motion):
     """Let the candidates act that are not open, with the last forces for shares; mark their slots."""
     contacts, smooth, candidates = motion.contacts, motion.smooth, motion.candidates
     k = 0
@@ -113,12 +113,12 @@ def project_candidate_speeds(y, offset_frame, work, motion):
             contacts.slot[contacts.count], contacts.sticks[contacts.count] = s, 0
             contacts.count += 1
     y = project_normal_speeds(y, offset_frame, work, motion)
-    activate_candidates(candidates.count, work, motion)
+    activate_candidates(candidates.count, motion)
     return y
 
 
 @inlined
-def contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates):
+def contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates):
     """Acceleration of candidate i: (normal part, tangential part)."""
     wall = wall_of(candidates.slot[i], work)
     n = wall_normal(work.walls, wall)

@@ -39,7 +39,7 @@ _SAME_DIRECTION = 1.0e-9
 
 
 @kernel
-def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
+def _worst_violation(count, rates, scale, offset_frame, work, motion):
     """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
 
     `rates` are the attitude, the angular velocity, and both accelerations of the trial.
@@ -78,7 +78,7 @@ def _worst_violation(count, y, rates, scale, offset_frame, work, motion):
         candidates.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, y, R, w, a, alpha, offset_frame, work, candidates)
+        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates)
         if candidates.state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
             return i, CANDIDATE_SLIDING if candidates.is_fresh[i] == 0 else CANDIDATE_STICKING
         if candidates.state[i] == CANDIDATE_SLIDING and candidates.is_fresh[i]:
@@ -116,7 +116,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
                 candidates.state[i] = CANDIDATE_STICKING
     f = as_vector(work.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):
-        activate_candidates(count, work, motion)
+        activate_candidates(count, motion)
         set_contact_kinematics(y, R, w, alpha_free, offset_frame, work, motion)
         m = assemble_unknowns(work.mu, True, work, motion)
         F, T = solve_contact_forces(m, P, work, motion.unknowns)
@@ -125,7 +125,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
         s = 1.0 / work.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _worst_violation(count, y, (R, w, a, alpha), scale, offset_frame, work, motion)
+        which, kind = _worst_violation(count, (R, w, a, alpha), scale, offset_frame, work, motion)
         if which < 0:
             return True
         if kind != candidates.state[which]:

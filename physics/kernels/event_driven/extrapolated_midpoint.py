@@ -226,7 +226,7 @@ def prepare_extrapolated_step(left, offset_frame, work, motion):
         h = _MAX_STEP_ROTATION / turn
     if contacts.count == 0 and has_fields(work):
         h = min(h, work.radius / (math.sqrt(qt.dot(state[2], state[2])) + math.sqrt(work.radius * work.acceleration)))
-    return _limit_to_slip_stop(h, P, w, work, motion)
+    return _limit_to_slip_stop(h, P, work, motion)
 
 
 @inlined
@@ -267,7 +267,7 @@ def _set_slip_turn_rate(offset_frame, work, motion):
 
 
 @inlined
-def _limit_to_slip_stop(h, P, w, work, motion):
+def _limit_to_slip_stop(h, P, work, motion):
     """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
 
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no

@@ -90,7 +90,7 @@ def cubic_minimum(g0, r0, g1, r1, h):
 
 
 @inlined
-def least_gap_margin(h, work, motion):
+def least_gap_margin(h, motion):
     """Smallest gap of the features that do not act [m] over a step of h.
 
     For a leaving feature this is its height above the place that it left, so that a bounce does not end deeper and gain
@@ -240,7 +240,7 @@ def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
     compute_state_rate(ROW_END, h, offset_frame, work, motion)
     recover_contact_forces(work.mu, work, motion)
     compute_feature_gaps(ROW_END, offset_frame, work, smooth)
-    gap, which = least_gap_margin(h, work, motion)
+    gap, which = least_gap_margin(h, motion)
     margin, guard = gap / work.radius, GUARD_GAP
     if heeds and smooth.weight > 0.0:
         least, sort, j = least_force_margin(slack, work, motion)

@@ -18,7 +18,6 @@ from physics.kernels.math.vector import times
 # Columns.
 ANGULAR_DRAG_LINEAR = 0  # c [N m s]
 ANGULAR_DRAG_QUADRATIC = 1  # d [N m s²]
-ANGULAR_DRAG_SIZE = 2
 
 
 @inlined

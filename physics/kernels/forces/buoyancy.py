@@ -23,7 +23,6 @@ from physics.kernels.state.layout import BLOCK, SPHERE
 FLUID_NORMAL = 0  # of the surface, up
 FLUID_OFFSET = 3  # the fluid is where normal·x <= offset [m]
 FLUID_WEIGHT = 4  # ρ g [N/m³]
-BUOYANCY_SIZE = 5
 
 
 @inlined

@@ -35,7 +35,6 @@ from physics.kernels.state.layout import BLOCK, SPHERE
 # Columns.
 DRAG_STRENGTH = 0  # ½ ρ C [kg/m³]
 DRAG_LINEAR = 1  # c [N s/m]
-DRAG_SIZE = 2
 
 
 @inlined

@@ -22,7 +22,6 @@ from physics.kernels.math.vector import minus, plus, times
 
 # Columns.
 MAGNUS_STRENGTH = 0  # ½ ρ C [kg/m³]
-MAGNUS_SIZE = 1
 
 
 @inlined

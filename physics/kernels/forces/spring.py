@@ -33,12 +33,10 @@ SPRING_ANCHOR = 3  # world frame [m]
 SPRING_LENGTH = 6  # l0 [m]
 SPRING_STIFFNESS = 7  # k [N/m]; 0 for other bodies than the spring's
 SPRING_DAMPING = 8  # c [N s/m]
-SPRING_SIZE = 9
 
 # Columns of a push.
 PUSH_FORCE = 3  # [N]; 0 for other bodies than the push's
 PUSH_IS_BODY_FIXED = 6  # 1: along the body axes, 0: along the world's
-PUSH_SIZE = 7
 
 
 @inlined

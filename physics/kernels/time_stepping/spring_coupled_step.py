@@ -53,9 +53,9 @@ class LinkedWorld(NamedTuple):
 
 
 def make_linked_world(
-    bodies: int, terms: tuple[Term, ...], *, relative_slop: float, tolerance: float, splits: int, **settings: float
+    bodies: int, terms: tuple[Term, ...], *, relative_slop: float, tolerance: float, splits: int
 ) -> LinkedWorld:
-    """Scratch for worlds of so many bodies in these fields, with numerical settings."""
+    """Scratch for worlds of so many bodies in these fields; `splits` are the steps of an extrapolation at most."""
     rows = np.zeros(bodies, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
     now, touched, room = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -12,6 +13,8 @@ from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, overload
 
 from physics.kernels.compile.cache_folder import cache_dir
+from physics.kernels.compile.fused.ablation import is_on
+from physics.kernels.compile.fused.atomics import atomic_add  # noqa: F401 (a part of the interface)
 from physics.kernels.compile.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
 from physics.kernels.compile.fused.user_functions import examine  # noqa: F401 (a part of the interface)
 
@@ -20,6 +23,15 @@ OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
 # Held while something is compiled or loaded.
 LOCK = global_compiler_lock
+
+# Calls are made in machine code, by the address of a kernel and of its arguments.
+PREPARES_CALLS = True
+
+# Python's calls of a kernel run machine code.
+MAKES_MACHINE_CODE = True
+
+# Allocations between two runs of the garbage collector while something is compiled; 0: none.
+COLLECT_AT = (0, 0, 0) if is_on("paused_gc") else gc.get_threshold()
 
 
 def make(function, called_as=PART_KIND, **options) -> Kernel:

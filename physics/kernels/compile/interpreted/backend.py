@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,6 +16,10 @@ from physics.kernels.compile.user_function import Examined, probe
 
 # Held while something is compiled elsewhere; here nothing is.
 LOCK = threading.RLock()
+
+# Answers as of `fused.backend`.
+PREPARES_CALLS, MAKES_MACHINE_CODE, COLLECT_AT = False, False, gc.get_threshold()
+atomic_add = None
 
 
 def part(function):

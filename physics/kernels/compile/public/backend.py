@@ -26,6 +26,10 @@ from physics.kernels.compile.user_function import Examined, FaultyFunctionError,
 # Held while something is compiled or loaded.
 LOCK = threading.RLock()
 
+# Answers as of `fused.backend`. Numba's tables would take half a gigabyte without the garbage collector.
+PREPARES_CALLS, MAKES_MACHINE_CODE, COLLECT_AT = False, True, (100_000, 50, 50)
+atomic_add = None
+
 _compilations = 0
 
 

@@ -70,11 +70,6 @@ def _support_hessian(D, s, p):
 
 
 @inlined
-def _signed(x):
-    return math.copysign(1.0, x) if x != 0.0 else 0.0
-
-
-@inlined
 def support_separation(A, is_block, B, dims, d, n):
     """Separation σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
     s, _ = ellipsoid_support_point(A, n)

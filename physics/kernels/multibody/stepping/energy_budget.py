@@ -136,7 +136,7 @@ def free_lift_work(b, many):
 
 
 @kernel
-def clamp_body_inside_walls(b, offset_frame, many):
+def clamp_body_inside_walls(b, many):
     """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
 
     Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,

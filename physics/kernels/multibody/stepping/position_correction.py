@@ -72,7 +72,7 @@ def _set_displacement_targets(n, many):
 def _pose_inside_walls(b, offset_frame, many):
     """Place of body b with its centre inside all walls."""
     update_body_pose(b, offset_frame, many)
-    clamp_body_inside_walls(b, offset_frame, many)
+    clamp_body_inside_walls(b, many)
 
 
 @kernel
