@@ -29,7 +29,7 @@ CALLED = (
 """Decorators under which a function is called by its name, and by nobody else."""
 
 EXCEPTIONS = {"_turned_scene", "_half_turn"}
-"""Functions of hard cases: their last parameters are of no use, and may go."""
+"""Names of functions that may have an unused last parameter."""
 
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
