@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 Undo = Callable[[], None]
 """Function that puts something back as it was when the function was made."""
 
 
-@contextmanager
-def undo_on_error(*undo: Undo | None) -> Iterator[None]:
+class undo_on_error:
     """Put everything back where a block raises an exception, an interrupt among them.
+
+    A class and no generator, which would take four times as long: a control step of a batch goes through it.
 
     Parameters
     ----------
     *undo : Undo or None
         Called in this order. None: nothing is to be put back.
     """
-    try:
-        yield
-    except BaseException:
-        for put_back in undo:
-            if put_back is not None:
-                put_back()
-        raise
+
+    __slots__ = ("_undo",)
+
+    def __init__(self, *undo: Undo | None):
+        self._undo = undo
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, *_) -> None:
+        if kind is not None:
+            for put_back in self._undo:
+                if put_back is not None:
+                    put_back()
