@@ -188,6 +188,8 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         self.task.step(actions)
         for generator, state in kept:
             generator.bit_generator.state = state
+        if put_back_memory is None:
+            return self._conclude()
         with undo_on_error(self.task.take_back, put_back_memory):  # an error of a start, or of a picture
             return self._conclude()
 
