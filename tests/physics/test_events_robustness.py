@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics import scenes
-from physics.plan import accuracy
+from physics import accuracy, scenes
 
 WORLDS, STEPS, DT = 4, 200, 0.02
 RADIUS = float(np.linalg.norm(scenes.SIZE)) / 2

@@ -322,7 +322,7 @@ def test_a_lone_hull_has_the_step_of_many_bodies_and_says_so():
     assert not plan.meeting
     assert "corners of hulls" in plan.explain()
     blocks = physics.Scene([physics.Block((1, 1, 1), 1.0, pos=(0, 2, 0))], [FLOOR], laws)
-    assert physics.make_plan(blocks, physics.Accuracy()).many is None
+    assert not physics.make_plan(blocks, physics.Accuracy()).scheme.couples_bodies
     assert "hulls" not in physics.make_plan(blocks, physics.Accuracy()).explain()
     free = physics.make_plan(physics.Scene(one.bodies, [], [physics.Gravity()]), physics.Accuracy())
     assert free.hulls is None

@@ -149,9 +149,9 @@ def test_an_error_that_cannot_be_met_is_counted_and_ends():
 
 def test_only_what_asks_for_an_error_pays_for_it():
     two, alone = tower(), rough([physics.Block((1, 1, 1), 1.0, pos=(0, 0.5, 0))], 0.5)
-    assert physics.make_plan(two, PRECISE).refined
-    assert physics.make_plan(two, PRECISE).events is None
-    assert physics.make_plan(alone, PRECISE).events
+    assert physics.make_plan(two, PRECISE).scheme.is_error_controlled
+    assert not physics.make_plan(two, PRECISE).scheme.is_event_driven
+    assert physics.make_plan(alone, PRECISE).scheme.is_event_driven
     for scene, accuracy in ((alone, PRECISE), (two, PRESETS["balanced"]), (two, PRESETS["fast"])):
-        assert physics.make_plan(scene, accuracy).refined is None
+        assert not physics.make_plan(scene, accuracy).scheme.is_error_controlled
     assert physics.World(two).motions == [None]

@@ -138,7 +138,7 @@ CASES = [
     Case("action-nan", lambda env: env.step(NAN), ("action", "nan", "finite"), "env"),
     Case("action-text", lambda env: env.step(["up"] * 6), ("action", "'up'", "numbers"), "env"),
     Case("action-none", lambda env: env.step(None), ("action", "()", "(6,)"), "env"),
-    Case("action-ragged", lambda env: env.step([[1, 2], [3], 1, 2, 3, 4]), ("action", "[3]", "6 numbers"), "env"),
+    Case("action-ragged", lambda env: env.step([[1, 2], [3], 1, 2, 3, 4]), ("action", "[3]", "(6,)"), "env"),
     Case("actions-inf", lambda envs: envs.step(MIXED), ("action", "world 2", "inf", "finite"), "batch"),
     Case("actions-one", lambda envs: envs.step(STILL), ("actions", "(6,)", "(3, 6)"), "batch"),
     Case("actions-complex", lambda envs: envs.step(np.full((3, 6), 1j)), ("actions", "j", "numbers"), "batch"),
