@@ -190,6 +190,8 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     thinner = _thinning(a, b, n, h, many)
+    if not thinner > pair_slop(a, b, many) and many.contacts.target[k, 0] != _PASSING:
+        return False, to  # as `_mark_passing` has found
     m, is_parted = _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:
         return False, to
