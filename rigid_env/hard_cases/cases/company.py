@@ -246,6 +246,7 @@ def closed_pairs(on: Setting) -> Sequence[Check]:
     all of them the same way at worst.
     """
     rng, count, checks = np.random.default_rng(9), on.pick(200, 40), []
+    parts = 10 if on.is_event_driven else 1  # of a step that meets an error, each with its own roundings
     sizes = {(1, 0.6, 0.4): 1.0, (0.5, 0.7, 0.6): 0.6}
     bodies = [physics.Block(size, mass, pos=(5 * k, 0, 0)) for k, (size, mass) in enumerate(sizes.items())]
     inertia = [body.mass / 12 * (np.sum(np.square(body.size)) - np.square(body.size)) for body in bodies]
@@ -261,7 +262,7 @@ def closed_pairs(on: Setting) -> Sequence[Check]:
         world.step(steps=steps)
         for what, one, other in zip(("linear", "angular"), before, _momenta(world, bodies, inertia)):
             change = np.abs(one - other).max() / np.abs(one).max()
-            checks.append(Check(f"change of the {what} momentum, e = {e}", float(change), 8 * EPS * steps))
+            checks.append(Check(f"change of the {what} momentum, e = {e}", float(change), 8 * EPS * steps * parts))
     return checks
 
 
