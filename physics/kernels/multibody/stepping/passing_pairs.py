@@ -32,9 +32,10 @@ from physics.kernels.multibody.data.contact_set import (
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
 from physics.kernels.state.body import read_state
-from physics.kernels.state.layout import SPHERE
+from physics.kernels.state.layout import BLOCK, HULL, SPHERE
 
 # Share of the slop below which the distance between thinned bodies counts as none: what GJK cannot tell from rounding.
 _TOUCH_SHARE = 1.0e-2
@@ -42,8 +43,10 @@ _TOUCH_SHARE = 1.0e-2
 # Cosine of the angle below which two directions are the same (4e-4 rad).
 _SAME_DIRECTION = 1.0 - 1.0e-7
 
-# Mark of a contact of a pair that passes, until targets are set.
+# Marks of the contacts of a pair, until targets are set: it passes if it is thinned by the slop; it meets, however
+# thin. Others stand between.
 _PASSING = 1.0
+_MEETING = -1.0
 
 # Slops up to which the depth that bodies go in counts as a landing: twice the `_SOFT_LANDING_SLOPS` of `impact`, which
 # the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
@@ -72,7 +75,7 @@ def _smallest_half_width(b, many):
 def _thinning(a, b, n, h, many):
     """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h.
 
-    They do not land in bodies that they pass (`_mark_passing`).
+    They do not land in bodies that they are marked to pass.
     """
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
@@ -117,13 +120,59 @@ def _end_pose(b, h, gyroscopic, offset_frame, many):
 
 
 @kernel
-def _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many):
-    """Direction out of b that parts the two throughout h, and whether there is one; `way` is a first guess."""
+def _hull_holds_point(b, p, thinner, many):
+    """True if point p, in the frame of hull b, lies below each of its faces by `thinner` [m]."""
+    tables = many.narrowphase.hulls
+    first = tables.of[b, FIRST_CORNER]
+    for f in range(tables.of[b, FIRST_FACE], tables.of[b, LAST_FACE]):
+        corner = row_vector(tables.corners, first + tables.ring[tables.loops[f, 0]], 0)
+        if not qt.dot(row_vector(tables.normals, f, 0), subtract(corner, p)) > thinner:
+            return False
+    return True
+
+
+@inlined
+def _holds_point(b, p, thinner, hulls, many):
+    """True if body b, thinned, holds point p in its frame."""
+    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
+    if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
+        if shape == HULL:
+            return _hull_holds_point(b, p, thinner, many)
+    if shape == SPHERE:
+        return qt.dot(p, p) < (d[0] - thinner) ** 2
+    d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)
+    if shape == BLOCK:
+        return abs(p[0]) < d[0] and abs(p[1]) < d[1] and abs(p[2]) < d[2]
+    f = (p[0] / d[0], p[1] / d[1], p[2] / d[2])
+    return qt.dot(f, f) < 1.0
+
+
+@inlined
+def _have_point_in_common(k, now, later, thinner, hulls, many):
+    """True if both bodies of contact k, thinned, hold the middle of where they carry its point; False says nothing."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    (c, R), (d, S) = now
+    (x, P), (y, Q) = later
+    p = add_scaled(row_vector(many.contacts.arm, k, 0), 1.0, subtract(row_vector(many.bodies.state, a, 0), c))
+    q = add_scaled(row_vector(many.contacts.arm, k, 3), 1.0, subtract(row_vector(many.bodies.state, b, 0), d))
+    p, q = qt.transposed_matvec(R, p), qt.transposed_matvec(S, q)
+    half = subtract(add_scaled(y, 1.0, qt.matvec(Q, q)), add_scaled(x, 1.0, qt.matvec(P, p)))
+    return _holds_point(a, add_scaled(p, 0.5, qt.transposed_matvec(P, half)), thinner, hulls, many) and _holds_point(
+        b, add_scaled(q, -0.5, qt.transposed_matvec(Q, half)), thinner, hulls, many
+    )
+
+
+@kernel
+def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
+    """Direction out of b that parts the bodies a and b of contact k throughout h, and whether there is one."""
+    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     now = (
         (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
         (row_vector(many.bodies.center, b, 0), row_matrix(many.bodies.rotation, b)),
     )
     later = (_end_pose(a, h, gyroscopic, offset_frame, many), _end_pose(b, h, gyroscopic, offset_frame, many))
+    if _have_point_in_common(k, now, later, thinner, hulls, many):
+        return way, False
     touch = _TOUCH_SHARE * pair_slop(a, b, many)
     n, gap = gjk_distance(a, b, now, later, way, touch, thinner, hulls, many)
     return n, gap > 0.0
@@ -160,23 +209,34 @@ def _fastest_stopping(first, last, h, many):
 
 
 @kernel
-def _mark_passing(n, h, gyroscopic, offset_frame, hulls, many):
-    """Mark contacts of pairs that pass within h if they are thinned by the slop: `many.contacts.target` is `_PASSING`.
+def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
+    """Mark of the pair whose fastest contact is k, of n in the set: `_PASSING`, `_MEETING` or 0.
 
-    Targets are set later, and only read here.
+    A pair that meets even where it is as thin as it may get needs no second look.
     """
+    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
+    slop, thinnest = pair_slop(a, b, many), _thinning(a, b, n, h, many)
+    m, is_parted = _parting_direction(k, thinnest, h, gyroscopic, offset_frame, hulls, many)
+    if not is_parted:
+        return _MEETING
+    if thinnest > slop:
+        m, is_parted = _parting_direction(k, slop, h, gyroscopic, offset_frame, hulls, many)
+    return _PASSING if is_parted and qt.dot(way, m) <= _SAME_DIRECTION else 0.0
+
+
+@inlined
+def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
+    """Write the mark of each pair into `many.contacts.target` of its contacts; targets are set later."""
+    for k in range(n):
+        many.contacts.target[k, 0] = 0.0
     k = 0
     while k < n:
         last = _end_of_pair(k, n, many)
-        found, mark = _fastest_stopping(k, last, h, many), 0.0
+        found = _fastest_stopping(k, last, h, many)
         if found >= 0:
-            a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-            way, slop = row_vector(many.contacts.frame, found, 0), pair_slop(a, b, many)
-            m, is_parted = _parting_direction(a, b, way, slop, h, gyroscopic, offset_frame, hulls, many)
-            if is_parted and qt.dot(way, m) <= _SAME_DIRECTION:
-                mark = _PASSING
-        for i in range(k, last):
-            many.contacts.target[i, 0] = mark
+            mark = _mark_of_pair(found, n, h, gyroscopic, offset_frame, hulls, many)
+            for i in range(k, last):
+                many.contacts.target[i, 0] = mark
         k = last
 
 
@@ -189,10 +249,10 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     any direction. Bodies that nothing else can push have no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
-    thinner = _thinning(a, b, n, h, many)
-    if not thinner > pair_slop(a, b, many) and many.contacts.target[k, 0] != _PASSING:
-        return False, to  # as `_mark_passing` has found
-    m, is_parted = _parting_direction(a, b, way, thinner, h, gyroscopic, offset_frame, hulls, many)
+    mark, thinner = many.contacts.target[k, 0], _thinning(a, b, n, h, many)
+    if mark == _MEETING or (mark != _PASSING and not thinner > pair_slop(a, b, many)):
+        return False, to
+    m, is_parted = _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:
         return False, to
     gap, p, q = _gap_along(a, b, m, hulls, many)
@@ -208,7 +268,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
 @shared_kernel
 def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     """Replace the contacts of each pair that passes within h by one along a plane that parts the two."""
-    _mark_passing(n, h, gyroscopic, offset_frame, hulls, many)
+    _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:
         last, is_passing = _end_of_pair(k, n, many), False
