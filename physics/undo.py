@@ -29,6 +29,6 @@ class undo_on_error:
 
     def __exit__(self, kind: type[BaseException] | None, *_) -> None:
         if kind is not None:
-            for put_back in self._undo:
-                if put_back is not None:
-                    put_back()
+            for undo in self._undo:
+                if undo is not None:
+                    undo()

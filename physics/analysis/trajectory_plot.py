@@ -12,7 +12,7 @@ from physics.optional import load_optional
 if TYPE_CHECKING:
     from physics.analysis.trajectory import BodyTrajectory, Trajectory
 
-SIZE = (7.5, 8.0)  # [inch]
+FIGURE_SIZE = (7.5, 8.0)  # [inch]
 DPI = 130
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#444444")
 MOST_LABELS = 12  # bodies that a legend names
@@ -56,7 +56,7 @@ def plot_bodies(trajectory: Trajectory, path: str | Path | None) -> Any:
 
 
 def _panels():
-    figure = load_optional("matplotlib.figure", "a plot").Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    figure = load_optional("matplotlib.figure", "a plot").Figure(figsize=FIGURE_SIZE, dpi=DPI, layout="constrained")
     return figure, figure.subplots(4, 1, sharex=True)
 
 

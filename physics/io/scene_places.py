@@ -1,6 +1,6 @@
 """Lines of tables and keys in the text of a scene file.
 
-The reader of TOML gives values without places, so these are searched in the text. A table [[bodies]] is found by its
+The reader of TOML gives values without lines, so these are searched in the text. A table [[bodies]] is found by its
 header, a key below it, before the next header. Errors in inline tables, ``bodies = [{...}]``, name the line of the
 list.
 """
@@ -13,7 +13,7 @@ import re
 HEADER = re.compile(r"\s*\[\[?\s*[A-Za-z_\"'][^,]*\]\s*(#.*)?$")
 
 
-class Places:
+class SourceLines:
     """Lines of one file's text.
 
     Parameters

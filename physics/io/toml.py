@@ -18,7 +18,7 @@ from typing import Any
 import tomlkit
 
 from physics import validation
-from physics.io.scene_places import Places
+from physics.io.scene_places import SourceLines
 from physics.keywords import known_keywords, nearest_first
 from physics.scene.bodies import Block, Ellipsoid, Hull, Sphere
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
@@ -52,13 +52,13 @@ class SceneFile:
     scene : Scene
     others : dict of str to dict
         Tables of `OTHERS` that the file has, with what stands in them, unchecked.
-    places : Places
+    lines : SourceLines
         Lines of the file, for errors about these tables.
     """
 
     scene: Scene
     others: dict[str, dict[str, Any]]
-    places: Places
+    lines: SourceLines
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:
@@ -154,30 +154,30 @@ def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(_syntax_error(text, source, str(error))) from None
-    places = Places(text, source)
-    _check_head(places, content)
+    lines = SourceLines(text, source)
+    _check_head(lines, content)
     known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
-    lists = {name: _build_all(places, name, content.get(name, []), known[name]) for name in LISTS}
+    lists = {name: _build_all(lines, name, content.get(name, []), known[name]) for name in LISTS}
     try:
         scene = Scene(**lists)
     except ValueError as error:
-        raise places.error_of_scene(lists, str(error)) from None
-    return SceneFile(scene, {name: content[name] for name in OTHERS if name in content}, places)
+        raise lines.error_of_scene(lists, str(error)) from None
+    return SceneFile(scene, {name: content[name] for name in OTHERS if name in content}, lines)
 
 
-def _check_head(places: Places, content: dict) -> None:
+def _check_head(lines: SourceLines, content: dict) -> None:
     """Refuse unknown keys and tables of a file's head, and formats that are newer than this reader."""
     known = ("format", *LISTS, *OTHERS)
     for key in content:
         if key not in known:
             allowed = ", ".join(nearest_first(key, known))
-            raise places.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
+            raise lines.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
     number = content.get("format", FORMAT)
     if type(number) is not int or number not in range(1, FORMAT + 1):
-        raise places.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
+        raise lines.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
     for name in OTHERS:
         if not isinstance(content.get(name, {}), dict):
-            raise places.error(None, 0, name, f"{name} is {shown(content[name])}; allowed is a table [{name}]")
+            raise lines.error(None, 0, name, f"{name} is {shown(content[name])}; allowed is a table [{name}]")
 
 
 def _own_kinds(kinds) -> tuple:
@@ -201,36 +201,36 @@ def _syntax_error(text: str, source: str, message: str) -> str:
     return f"{source}, {place}: {told.group(1)}, in {stands}; allowed is TOML, as `physics.save_scene` writes it"
 
 
-def _build_all(places: Places, name: str, tables, known: tuple[type, ...]) -> list:
+def _build_all(lines: SourceLines, name: str, tables, known: tuple[type, ...]) -> list:
     """The objects of a list of tables."""
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise places.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
-    return [_build(places, name, k, dict(table), known) for k, table in enumerate(tables)]
+        raise lines.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
+    return [_build(lines, name, k, dict(table), known) for k, table in enumerate(tables)]
 
 
-def _build(places: Places, name: str, index: int, table: dict, known: tuple[type, ...]):
+def _build(lines: SourceLines, name: str, index: int, table: dict, known: tuple[type, ...]):
     kinds = {kind.__name__: kind for kind in known}
     if len(known) == 1:
         chosen = next(iter(kinds))
     elif "kind" in table:
         chosen = table.pop("kind")
     else:
-        raise places.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
+        raise lines.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
     if not isinstance(chosen, str) or chosen not in kinds:
         allowed = ", ".join(nearest_first(chosen, kinds) if isinstance(chosen, str) else kinds)
-        raise places.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
+        raise lines.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
     kind = kinds[chosen]
     parameters = {field.name: field for field in fields(kind) if field.init}
     for key in table:
         if key not in parameters:
             allowed = ", ".join(nearest_first(key, parameters))
-            raise places.error(name, index, key, f"{key} is not known; allowed are {allowed}")
+            raise lines.error(name, index, key, f"{key} is not known; allowed are {allowed}")
     for key, field in parameters.items():
         if field.default is MISSING and field.default_factory is MISSING and key not in table:
-            raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
+            raise lines.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
     try:
         return kind(**table)
     except (ValueError, TypeError) as error:
         told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
         key = told.group(1) if told and told.group(1) in parameters else None
-        raise places.error(name, index, key, str(error)) from None
+        raise lines.error(name, index, key, str(error)) from None

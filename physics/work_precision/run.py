@@ -24,7 +24,7 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.truth import UNITS, ReferenceTruth, Truth
 from physics.world.report import Status
 
-PRESETS: tuple[Preset, ...] = ("fast", "balanced", "precise")
+SHOWN_PRESETS: tuple[Preset, ...] = ("fast", "balanced", "precise")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)  # [s]
 COARSE_STEPS = (0.1, 0.05)  # of an event-driven scheme besides, which is as exact there and pays less [s]
 REPEATS = 5
@@ -49,7 +49,7 @@ Progress = Callable[[int, int, str], None]
 
 @known_keywords
 def ladder(
-    accuracies: Sequence[Preset | Accuracy] = PRESETS, steps: Sequence[float] | None = None
+    accuracies: Sequence[Preset | Accuracy] = SHOWN_PRESETS, steps: Sequence[float] | None = None
 ) -> list[tuple[Preset | Accuracy, float]]:
     """Every accuracy at every step [s]: the `settings` of `frontier`.
 

@@ -68,12 +68,12 @@ class Actuation:
     def advance(self, world: Batch, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make `World.advance` through the actuator; one with a memory is called at each step."""
         if steps == 1 or not self.actuator.remembers:
-            self.take(wrench, dt)
+            self.apply(wrench, dt)
             world.make(calls, steps * dt)
             return
         total = np.zeros_like(world.report_table)
         for _ in range(steps):
-            self.take(wrench, dt)
+            self.apply(wrench, dt)
             world.make(calls, dt)
             add_report(total, world.report_table)
         world.report_table[...] = total
@@ -87,7 +87,7 @@ class Actuation:
         finally:
             self.past = None
 
-    def take(self, wrench: np.ndarray, dt: float) -> None:
+    def apply(self, wrench: np.ndarray, dt: float) -> None:
         """Take the command of a step of `dt` [s]; `applied` is then the acting wrench."""
         if self.actuator.delay > 0.0:
             self._command = self._nothing()
@@ -125,7 +125,7 @@ class Actuation:
             rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self, worlds: np.ndarray | None = None) -> tuple:
-        """State of the actuators of some worlds, or of all, for `put_back` and `put_worlds`."""
+        """State of the actuators of some worlds, or of all, for `reinstate` and `reinstate_worlds`."""
         if worlds is None:
             return self.output.copy(), [(age, command.copy()) for age, command in self._late]
         output, late = self.output, self._late
@@ -133,13 +133,13 @@ class Actuation:
             (age, self._rows(command, worlds).reshape(-1, 6)) for age, command in late
         ]
 
-    def put_back(self, kept: tuple) -> None:
+    def reinstate(self, kept: tuple) -> None:
         """Restore a state from `kept` of all worlds."""
         output, late = kept
         self.output[...] = output
         self._late = [(age, command.copy()) for age, command in late]
 
-    def put_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray) -> None:
+    def reinstate_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray) -> None:
         """Restore `worlds` (k,) from the worlds `source` (k,) of a state from `kept`.
 
         Parameters

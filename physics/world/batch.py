@@ -39,10 +39,10 @@ class ActuatorState(Protocol):
     def kept(self, worlds: np.ndarray | None = None) -> Any:
         """Copy all that decides the coming wrenches, of some worlds or all."""
 
-    def put_back(self, kept: Any) -> None:
+    def reinstate(self, kept: Any) -> None:
         """Restore the state when `kept` was taken."""
 
-    def put_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
+    def reinstate_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
         """Restore worlds from those of `source` in `kept`."""
 
     def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:

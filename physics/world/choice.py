@@ -7,7 +7,7 @@ import numpy as np
 from physics.summary import shown
 
 
-def chosen(worlds, count: int, field: str = "worlds", once: bool = True) -> np.ndarray:
+def world_indices(worlds, count: int, field: str = "worlds", once: bool = True) -> np.ndarray:
     """Indices (k,) int64 of the chosen worlds of `count`; a mask of so many bools is allowed, too.
 
     Parameters

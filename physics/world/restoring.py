@@ -19,7 +19,7 @@ from physics.world.scene_settings import other_setting
 from physics.world.snapshot import KEPT, Snapshot
 
 
-class Places(NamedTuple):
+class Targets(NamedTuple):
     """Worlds to restore, and their sources in a snapshot."""
 
     worlds: np.ndarray | None  # (k,) indices into the batch; None: all
@@ -27,9 +27,9 @@ class Places(NamedTuple):
     is_all: bool  # every world of the batch is among them
 
 
-def take(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
+def capture(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
     """`World.snapshot`, which documents it."""
-    chosen = None if worlds is None else choice.chosen(worlds, world.worlds)
+    chosen = None if worlds is None else choice.world_indices(worlds, world.worlds)
     kept, rows = world.kept(), world.kept_rows()
     actuation = None if world.actuation is None else world.actuation.kept(chosen)
     if chosen is None:
@@ -50,8 +50,8 @@ def take(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
     return out
 
 
-def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
-    """Check the arguments of `World.restore`, which documents them; return the places."""
+def find_targets(world: Batch, snapshot: Snapshot, worlds, source) -> Targets:
+    """Check the arguments of `World.restore`, which documents them; return the targets."""
     validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
     is_own = snapshot.scene is world.scene_settings
     if not is_own:
@@ -59,8 +59,8 @@ def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
     if (
         worlds is None and source is None and not snapshot.is_read and is_own and _is_alike(world, snapshot)
     ):  # the most frequent
-        return Places(None, None, True)
-    chosen = None if worlds is None else choice.chosen(worlds, world.worlds)
+        return Targets(None, None, True)
+    chosen = None if worlds is None else choice.world_indices(worlds, world.worlds)
     count = world.worlds if chosen is None else len(chosen)
     held = _world_count(world, snapshot, count)
     if not is_own:
@@ -75,15 +75,15 @@ def places(world: Batch, snapshot: Snapshot, worlds, source) -> Places:
     elif np.ndim(source) == 0:
         source = np.full(count, validation.index(source, held, "source"))
     else:
-        given, source = source, choice.chosen(source, held, "source", once=False)
+        given, source = source, choice.world_indices(source, held, "source", once=False)
         if len(source) != count:
             raise ValueError(f"source is {shown(given)}; allowed is one index, or {count}, for each world restored")
-    return Places(chosen, source, count == world.worlds)
+    return Targets(chosen, source, count == world.worlds)
 
 
-def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
-    """Restore worlds from a snapshot; arguments as checked by `places`."""
-    chosen, source, is_all = at_places
+def reinstate(world: Batch, snapshot: Snapshot, targets: Targets) -> None:
+    """Restore worlds from a snapshot; arguments as checked by `find_targets`."""
+    chosen, source, is_all = targets
     if not is_all and snapshot.time != world.time:
         _check_clock(world, snapshot)
     where = slice(None) if chosen is None else chosen
@@ -94,7 +94,7 @@ def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
             rows = _by_world(value, n, snapshot.worlds)
             _by_world(array, n, world.worlds)[where] = rows if source is None else rows[source]
     if world.actuation is not None:
-        _put_actuation(world, snapshot, at_places)
+        _reinstate_actuation(world, snapshot, targets)
     if is_all:
         world.time = snapshot.time
     if world.recorder is not None:
@@ -103,18 +103,18 @@ def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
 
 def remember(world: Batch) -> Undo:
     """Copy a batch; to put it back is to restore it."""
-    before = take(world, None, None)
-    return lambda: put(world, before, Places(None, None, True))
+    before = capture(world, None, None)
+    return lambda: reinstate(world, before, Targets(None, None, True))
 
 
-def _put_actuation(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
-    chosen = np.arange(world.worlds) if at_places.worlds is None else at_places.worlds
+def _reinstate_actuation(world: Batch, snapshot: Snapshot, targets: Targets) -> None:
+    chosen = np.arange(world.worlds) if targets.worlds is None else targets.worlds
     if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
         world.actuation.forget(chosen)
         return
-    source = np.arange(snapshot.worlds) if at_places.source is None else at_places.source
+    source = np.arange(snapshot.worlds) if targets.source is None else targets.source
     source = np.broadcast_to(source, len(chosen))
-    world.actuation.put_worlds(snapshot.actuation, source, chosen)
+    world.actuation.reinstate_worlds(snapshot.actuation, source, chosen)
 
 
 def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool) -> None:

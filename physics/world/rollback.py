@@ -14,13 +14,13 @@ def remember(world: Batch) -> Undo:
     time, arrays = world.time, [array.copy() for array in world.kept()]
     actuation = None if world.actuation is None else world.actuation.kept()
 
-    def put_back() -> None:
+    def undo() -> None:
         for array, before in zip(world.kept(), arrays, strict=True):
             array[...] = before
         world.time = time
         if world.actuation is not None:
-            world.actuation.put_back(actuation)
+            world.actuation.reinstate(actuation)
         if world.recorder is not None:
             world.recorder.undone()
 
-    return put_back
+    return undo

@@ -165,11 +165,11 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
     shapes: dict[str, tuple[int, ...]] = {
         name: (world.worlds, length // every, world.body_count, SIZES[name]) for name in _columns(columns)
     }
-    places = None if initial is None else restoring.places(world, initial, None, None)
+    targets = None if initial is None else restoring.find_targets(world, initial, None, None)
     found = _room(world, shapes) if out is None else _checked(out, world.names, shapes)
     with undo_on_error(restoring.remember(world) if world.plan.may_raise else None):
-        if places is not None:
-            restoring.put(world, initial, places)
+        if targets is not None:
+            restoring.reinstate(world, initial, targets)
         advance(world, wrenches, found._as_room(), steps, dt, every)
     return found
 

@@ -22,7 +22,7 @@ from physics.world.stepper import kernel_calls
 
 # Worlds that a thread steps through all of time before the next ones: few enough for the cache of a processor, and
 # enough that the calls are a small part of the step.
-BLOCK = 8
+BLOCK_STEPS = 8
 
 # `moment`, of one thread: the first of the worlds that are stepped, their end, and which step it is.
 FIRST, END, STEP, MOMENT_SIZE = range(4)
@@ -93,7 +93,7 @@ class RolloutLoop:
 
     def __init__(self, world: Batch, wrench: np.ndarray, steps: int, dt: float):
         self._world, self._duration = world, steps * dt
-        self._inner = [WorkQueue(work_stealing.make_ranges(1, world.worlds, BLOCK),
+        self._inner = [WorkQueue(work_stealing.make_ranges(1, world.worlds, BLOCK_STEPS),
                                  work_stealing.make_taken_lists(1, world.worlds)[0])
                        for _ in world.team.queues]  # fmt: skip
         self._stepping = kernel_calls(world, wrench, steps, dt, self._inner)
@@ -125,7 +125,7 @@ class RolloutLoop:
         np.add.accumulate(times, out=times)  # as times add up step by step
         chains = [first.then(step).then(last) for first, step, last in zip(before, self._stepping, after, strict=True)]
         loops = [
-            _bound((outer, inner, BLOCK, times[:-1], _clock(world, k), self.moments[k], *chains[k].handed))
+            _bound((outer, inner, BLOCK_STEPS, times[:-1], _clock(world, k), self.moments[k], *chains[k].handed))
             for k, (outer, inner) in enumerate(zip(world.team.queues, self._inner, strict=True))
         ]
         try:

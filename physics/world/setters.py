@@ -269,7 +269,7 @@ def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
 
 def _chosen(world: Batch, worlds) -> np.ndarray:
     """Indices (k,) int64 of the worlds that a user chooses."""
-    return np.arange(world.worlds) if worlds is None else choice.chosen(worlds, world.worlds)
+    return np.arange(world.worlds) if worlds is None else choice.world_indices(worlds, world.worlds)
 
 
 def _rows(world: Batch, chosen: np.ndarray) -> np.ndarray:

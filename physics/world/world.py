@@ -342,7 +342,7 @@ class World(Batch):
         ValueError
             A world named twice or not there, or `out` of another size. Nothing has changed then.
         """
-        return restoring.take(self, worlds, out)
+        return restoring.capture(self, worlds, out)
 
     @known_keywords
     def restore(
@@ -372,17 +372,17 @@ class World(Batch):
         A batch has one `time`. It becomes the snapshot's where all worlds are restored, and stays otherwise.
         Commands that a delayed actuator still holds keep their age.
         """
-        self.restore_at(snapshot, restoring.places(self, snapshot, worlds, source))
+        self.restore_targets(snapshot, restoring.find_targets(self, snapshot, worlds, source))
 
-    def restore_at(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
-        """Do `restore` after its checks, for callers that made them with `restoring.places`."""
-        if self.is_torn and at_places.is_all:
+    def restore_targets(self, snapshot: Snapshot, targets: restoring.Targets) -> None:
+        """Do `restore` after its checks, for callers that made them with `restoring.find_targets`."""
+        if self.is_torn and targets.is_all:
             self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
-        self._restore(snapshot, at_places)
+        self._restore(snapshot, targets)
 
     @exclusive
-    def _restore(self, snapshot: Snapshot, at_places: restoring.Places) -> None:
-        restoring.put(self, snapshot, at_places)
+    def _restore(self, snapshot: Snapshot, targets: restoring.Targets) -> None:
+        restoring.reinstate(self, snapshot, targets)
 
     def contacts(self, world: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Contact points and forces of one world's last step.

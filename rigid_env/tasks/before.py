@@ -47,6 +47,6 @@ class Before:
             array[...] = kept
         task.world.time, task.clock = self._time, self._clock
         if self._actuation is not None:
-            task.world.actuation.put_back(self._actuation)
+            task.world.actuation.reinstate(self._actuation)
         for world, state in self._generators.items():
             task.generators[world].bit_generator.state = state

@@ -195,7 +195,7 @@ def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], wo
     ValueError
         A world that is not there, or named twice.
     """
-    chosen: Any = slice(None) if worlds is None else choice.chosen(worlds, task.worlds)
+    chosen: Any = slice(None) if worlds is None else choice.world_indices(worlds, task.worlds)
     indices = range(task.worlds) if worlds is None else chosen.tolist()
     states = [task.generators[world] for world in indices]
     return TaskState(
@@ -234,11 +234,11 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
     """
     validation.instance(state, TaskState, "state", "what get_state gives")
     _check(task, arrays, state)
-    places = restoring.places(task.world, state.world, worlds, source)
+    places = restoring.find_targets(task.world, state.world, worlds, source)
     if not places.is_all and state.held.keys() != task.episodes.held.keys():
         ours, theirs = (", ".join(held) or "nothing" for held in (task.episodes.held, state.held))
         raise ValueError(f"state holds {theirs}, the task {ours}; allowed is the same, or a state for all worlds")
-    task.world.restore_at(state.world, places)
+    task.world.restore_targets(state.world, places)
     chosen, sources = _indices(task.worlds, state.worlds, places)
     if places.worlds is None and places.source is None and state.worlds == task.worlds:
         _write(task, arrays, state, slice(None), slice(None))
@@ -261,7 +261,7 @@ def remember(task, rows: np.ndarray | None = None) -> Undo:
     return put_back
 
 
-def _indices(worlds: int, held: int, places: restoring.Places) -> tuple[np.ndarray, np.ndarray]:
+def _indices(worlds: int, held: int, places: restoring.Targets) -> tuple[np.ndarray, np.ndarray]:
     """Indices of the worlds that change, and of those of the state from which they continue."""
     chosen = np.arange(worlds) if places.worlds is None else places.worlds
     if places.source is not None:

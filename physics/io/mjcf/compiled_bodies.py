@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.model import Frame, Model
+from physics.io.mjcf.model import Model, Pose
 from physics.io.mjcf.shapes import Placed, make_body
 from physics.io.mjcf.text import ModelError
 from physics.io.mjcf.touching import Touching
@@ -28,7 +28,7 @@ DIAGONALISED = 1e-6
 SINGLE = 1e-6
 
 
-class FreeBody(NamedTuple):
+class BodyElements(NamedTuple):
     """A body of the scene, and its elements in the model.
 
     Attributes
@@ -47,7 +47,7 @@ class FreeBody(NamedTuple):
     is_centred: bool
 
 
-def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[FreeBody]:
+def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[BodyElements]:
     """All free bodies that a scene can hold, in their order."""
     found = []
     for number, root in enumerate(_free_roots(model, left)):
@@ -76,7 +76,7 @@ def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
             yield int(m.jnt_bodyid[j])
 
 
-def _free_body(model: Model, touching: Touching, root: int, number: int) -> FreeBody:
+def _free_body(model: Model, touching: Touching, root: int, number: int) -> BodyElements:
     m = model.data
     parts = parts_of(model, root)
     geom, mass = _shape(model, touching, root, parts), _mass_properties(model, parts)
@@ -101,7 +101,7 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Free
         )
     except ValueError as error:
         raise model.error("body", root, f"in a scene: {error}") from None
-    return FreeBody(body, root, joint, geom, not mass.centre.any())
+    return BodyElements(body, root, joint, geom, not mass.centre.any())
 
 
 def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
@@ -163,7 +163,7 @@ def _points(model: Model, geom: int) -> np.ndarray:
     corners, stated = _corners(model, mesh), model.stated_points(mesh)
     if stated is not None:
         # MuJoCo turns a mesh to its principal axes, in single precision.
-        turned = Frame(m.mesh_pos[mesh], m.mesh_quat[mesh])
+        turned = Pose(m.mesh_pos[mesh], m.mesh_quat[mesh])
         distances = np.linalg.norm(stated[:, None] - (turned.pos + corners @ turned.R.T), axis=2)
         if distances.min(axis=0).max() <= SINGLE * np.abs(stated).max():
             frame, corners = frame @ turned.inverse, stated[distances.argmin(axis=0)]

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 
 from physics.io.mjcf import forces
-from physics.io.mjcf.compiled_bodies import FreeBody, free_bodies
+from physics.io.mjcf.compiled_bodies import BodyElements, free_bodies
 from physics.io.mjcf.contacts import contact_effects, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, compile_model
@@ -47,7 +47,7 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
     return Scene([each.body for each in free], [_wall(model, plane) for plane in planes], effects)
 
 
-def _contact(model: Model, touching: Touching, free: list[FreeBody], left: LeftOut) -> tuple[list[int], list]:
+def _contact(model: Model, touching: Touching, free: list[BodyElements], left: LeftOut) -> tuple[list[int], list]:
     """Planes that are walls, and effects of contact."""
     bodies = [touching.surface(each.geom) for each in free]
     met = _met_planes(model, touching, dict.fromkeys(bodies), left)

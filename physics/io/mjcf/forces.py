@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.io.mjcf.compiled_bodies import FreeBody, parts_of
+from physics.io.mjcf.compiled_bodies import BodyElements, parts_of
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model
 from physics.io.mjcf.text import Element, ModelError
@@ -49,7 +49,7 @@ def _option_error(model: Model, tag: str, key: str, message: str) -> ModelError:
     return ModelError(f"<{tag}> {message}", found[-1].line if found else 0)
 
 
-def gravity(model: Model, free: list[FreeBody], left: LeftOut) -> list[Gravity]:
+def gravity(model: Model, free: list[BodyElements], left: LeftOut) -> list[Gravity]:
     """Gravity minus the share of it that the model compensates, if that is equal for all bodies."""
     m = model.data
     if model.disables("GRAVITY"):
@@ -68,7 +68,7 @@ def gravity(model: Model, free: list[FreeBody], left: LeftOut) -> list[Gravity]:
     return [Gravity(acceleration)] if acceleration.any() else []
 
 
-def damping(model: Model, free: list[FreeBody], left: LeftOut) -> list[Any]:
+def damping(model: Model, free: list[BodyElements], left: LeftOut) -> list[Any]:
     """Linear drag with the damping of the free joints, if that is equal for all."""
     m = model.data
     found = {each.joint: _damping(model, each.joint) for each in free}
@@ -93,7 +93,7 @@ def _damping(model: Model, joint: int) -> np.ndarray:
     return np.append(m.dof_damping[dof], model.value("dof_dampingpoly", np.zeros((m.nv, 0)))[dof])
 
 
-def joint_faults(model: Model, free: list[FreeBody]) -> Iterator[ModelError]:
+def joint_faults(model: Model, free: list[BodyElements]) -> Iterator[ModelError]:
     """Properties of free joints that a scene lacks."""
     m = model.data
     tables = {

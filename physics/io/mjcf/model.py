@@ -23,20 +23,20 @@ LISTS = {
 PARSED = (".xml", ".urdf")  # endings of files that MuJoCo opens
 
 
-class Frame(NamedTuple):
+class Pose(NamedTuple):
     """Origin (3,) [m] and unit quaternion (4,) of a frame in another frame."""
 
     pos: np.ndarray
     quat: np.ndarray
 
-    def __matmul__(self, inner: Frame) -> Frame:
+    def __matmul__(self, inner: Pose) -> Pose:
         """Frame `inner`, given in this frame, in the outer frame of this one."""
-        return Frame(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
+        return Pose(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
 
     @property
-    def inverse(self) -> Frame:
+    def inverse(self) -> Pose:
         """Outer frame, given in this frame."""
-        return Frame(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
+        return Pose(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
 
     @property
     def R(self) -> np.ndarray:
@@ -44,7 +44,7 @@ class Frame(NamedTuple):
         return rotation_matrices(self.quat)
 
 
-ORIGIN = Frame(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+ORIGIN = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 class Model:
@@ -61,9 +61,9 @@ class Model:
     Attributes
     ----------
     data : mujoco.MjModel
-    frames : list of Frame
+    frames : list of Pose
         Of each body, in the frame of the moving body that it is fixed to, or of the world.
-    geom_frames : list of Frame
+    geom_frames : list of Pose
         Of each geom, likewise.
     """
 
@@ -75,13 +75,11 @@ class Model:
         m = self.data
         self.frames = [ORIGIN]
         for b in range(1, m.nbody):
-            inner = Frame(m.body_pos[b], m.body_quat[b])
+            inner = Pose(m.body_pos[b], m.body_quat[b])
             self.frames.append(ORIGIN if m.body_dofnum[b] else self._parent(b) @ inner)
-        self.geom_frames = [
-            self.frames[m.geom_bodyid[g]] @ Frame(m.geom_pos[g], m.geom_quat[g]) for g in range(m.ngeom)
-        ]
+        self.geom_frames = [self.frames[m.geom_bodyid[g]] @ Pose(m.geom_pos[g], m.geom_quat[g]) for g in range(m.ngeom)]
 
-    def _parent(self, b: int) -> Frame:
+    def _parent(self, b: int) -> Pose:
         return self.frames[self.data.body_parentid[b]]
 
     def moves(self, b: int) -> bool:

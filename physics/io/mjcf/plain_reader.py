@@ -21,8 +21,8 @@ from physics.scene.effects import Gravity
 from physics.scene.scene import HalfSpace, Scene
 
 DENSITY = 1000.0  # MuJoCo's default [kg/m³]
-GRAVITY = "0 0 -9.81"  # likewise
-FRICTION = "1 0.005 0.0001"  # likewise: sliding, torsion, rolling
+DEFAULT_GRAVITY = "0 0 -9.81"  # likewise
+DEFAULT_FRICTION = "1 0.005 0.0001"  # likewise: sliding, torsion, rolling
 
 SHAPES = ("box", "sphere", "ellipsoid", "mesh")
 
@@ -76,7 +76,7 @@ def read_scene(root: Element) -> Scene:
     starts = _starts(root, elements)
     bodies = [_body(b, element, meshes, *start) for b, (element, start) in enumerate(zip(elements, starts))]
     option = root.find("option")
-    gravity = _numbers(root if option is None else option, "gravity", 3, GRAVITY)
+    gravity = _numbers(root if option is None else option, "gravity", 3, DEFAULT_GRAVITY)
     effects = [Gravity(gravity)] if gravity.any() else []
     surfaces, floors = [_surface(element.find("geom")) for element in elements], [_surface(plane) for plane in planes]
     contact = contact_effects(surfaces, [floor for floor in floors if touched(floor, surfaces)], LeftOut())
@@ -267,5 +267,5 @@ def _surface(geom: Element) -> Surface:
         _integer(geom, "contype", 1),
         _integer(geom, "conaffinity", 1),
         condim,
-        float(_numbers(geom, "friction", 3, FRICTION, least=1)[0]),
+        float(_numbers(geom, "friction", 3, DEFAULT_FRICTION, least=1)[0]),
     )

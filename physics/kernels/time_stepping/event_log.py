@@ -27,7 +27,7 @@ NOBODY = -1
 EVENT_IMPULSE_ROUNDING = 1.0e-14
 
 
-class Event(NamedTuple):
+class EventRow(NamedTuple):
     """Event of a body; all vectors in the world frame, zero where undefined."""
 
     kind: int  # KIND_IMPACT and so on
@@ -40,7 +40,7 @@ class Event(NamedTuple):
 
 @kernel
 def note_event(log, counts, i, t, event):
-    """Add an `Event` of body i at the time t [s]; an event without room is only counted."""
+    """Add an `EventRow` of body i at the time t [s]; an event without room is only counted."""
     k = counts[i]
     counts[i] = k + 1
     if k < log.shape[1]:
@@ -72,7 +72,7 @@ def drop_events(world, bodies, t, log, counts):
 def note_mode_change(log, counts, i, t, kind, wall):
     """Add an event of body i without an impulse."""
     zero = (0.0, 0.0, 0.0)
-    note_event(log, counts, i, t, Event(kind, wall, NOBODY, zero, zero, zero))
+    note_event(log, counts, i, t, EventRow(kind, wall, NOBODY, zero, zero, zero))
 
 
 @inlined
@@ -99,7 +99,7 @@ def note_impact(log, counts, i, t, wall, other, impulse, sums):
     if not (weight > 0.0 and size > 0.0):
         return
     normal, point = (n[0] / size, n[1] / size, n[2] / size), (r[0] / weight, r[1] / weight, r[2] / weight)
-    note_event(log, counts, i, t, Event(KIND_IMPACT, wall, other, impulse, point, normal))
+    note_event(log, counts, i, t, EventRow(KIND_IMPACT, wall, other, impulse, point, normal))
 
 
 @kernel

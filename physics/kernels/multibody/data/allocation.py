@@ -27,7 +27,7 @@ from physics.kernels.multibody.data.arrays import (
     Bodies,
     BodiesWorkspace,
     BroadPhase,
-    Contacts,
+    ContactSet,
     Islands,
     LinearSystem,
     NarrowPhase,
@@ -160,9 +160,9 @@ def _make_narrow_phase(polyhedra: Sequence) -> NarrowPhase:
     )
 
 
-def _make_contacts(contacts: int) -> Contacts:
+def _make_contacts(contacts: int) -> ContactSet:
     i = np.int64
-    return Contacts(
+    return ContactSet(
         bodies=np.zeros((contacts, 2), i),
         id=np.zeros(contacts, i),
         owner=np.zeros(contacts, i),

@@ -123,7 +123,7 @@ class NarrowPhase(NamedTuple):
     hulls: Hulls | None  # tables of convex polyhedra, and scratch for a pair; None in a world without hulls
 
 
-class Contacts(NamedTuple):
+class ContactSet(NamedTuple):
     """Contact set of a stage, a row for each contact."""
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k
@@ -152,7 +152,7 @@ class Sweeps(NamedTuple):
     motion: np.ndarray  # (bodies, COLUMN_SIZE) twists during the sweeps, columns of `block_lu` [m/s, rad/s]
     normal_rows: np.ndarray  # (contacts, NORMAL_ROW_SIZE) of `normal_rows`: row of the Jacobian, and M⁻¹ times it
     visit_rows: np.ndarray  # (contacts, VISIT_SIZE) of `contact_rows`: data of the contacts, in visiting order
-    visit_bodies: np.ndarray  # (contacts, 2) int, `Contacts.bodies` in visiting order
+    visit_bodies: np.ndarray  # (contacts, 2) int, `ContactSet.bodies` in visiting order
     impulse_4_sweeps_ago: np.ndarray  # (contacts, 3) impulses of the visits, for the extrapolation [N s]
     impulse_2_sweeps_ago: np.ndarray  # (contacts, 3) the same, two sweeps later [N s]
     visited: np.ndarray  # (contacts,) int, number of the last visit of a contact
@@ -209,7 +209,7 @@ class BodiesWorkspace(NamedTuple):
     bodies: Bodies
     broadphase: BroadPhase
     narrowphase: NarrowPhase
-    contacts: Contacts
+    contacts: ContactSet
     sweeps: Sweeps
     islands: Islands
     system: LinearSystem
