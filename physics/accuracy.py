@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from physics import validation
-from physics.annotations import Preset, Scheme
+from physics.annotations import Preset, SchemeName
 from physics.html_table import fields_table
 from physics.kernels.flight import integrators
 from physics.keywords import known_keywords
 
 # Values of `Accuracy.scheme` and their codes: 0 is time stepping with the exact flow, -1 stepping to a tolerance.
 EVENTS = -1
-INTEGRATORS: dict[Scheme, int] = {
+INTEGRATORS: dict[SchemeName, int] = {
     "events": EVENTS,
     "exact": 0,
     "explicit_euler": integrators.EXPLICIT_EULER,
@@ -88,7 +88,7 @@ class Accuracy:
     """
 
     substeps: int = 1
-    scheme: Scheme = "exact"
+    scheme: SchemeName = "exact"
     solver: Literal["sweeps", "sweeps+pivoting"] = "sweeps+pivoting"
     tolerance: float = 1e-6
     iterations: int = 200

@@ -23,7 +23,7 @@ Layout = Literal["three", "corner"]
 Preset = Literal["fast", "balanced", "precise", "reference"]
 """Name of an accuracy."""
 
-Scheme = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
+SchemeName = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
 """Name of an integration scheme; see `physics.Accuracy`."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])

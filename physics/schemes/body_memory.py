@@ -70,7 +70,7 @@ def _add_forces(indices, memory, out):
                     out[n, b, j] -= force
 
 
-def contacts_of(memory: np.ndarray) -> int:
+def contact_capacity(memory: np.ndarray) -> int:
     """Contacts that a row has room for."""
     return (memory.shape[1] - many.WARM_HEADER_SIZE) // many.WARM_CONTACT_SIZE
 
@@ -95,7 +95,7 @@ class BodyMemory(ContactMemory):
         return 1
 
     def is_valid(self, worlds: Any, memory: np.ndarray) -> bool:
-        room, counts = contacts_of(memory), memory[:, many.WARM_CONTACT_COUNT]
+        room, counts = contact_capacity(memory), memory[:, many.WARM_CONTACT_COUNT]
         if not are_indices(counts, room + 1):
             return False
         rows = memory[:, many.WARM_HEADER_SIZE :][:, : room * many.WARM_CONTACT_SIZE].reshape(len(memory), room, -1)
@@ -109,7 +109,7 @@ class BodyMemory(ContactMemory):
         )
 
     def room(self, worlds: Any) -> int:
-        return contacts_of(worlds.memory)
+        return contact_capacity(worlds.memory)
 
     def count(self, worlds: Any, index: int) -> int:
         return int(worlds.memory[index, many.WARM_CONTACT_COUNT])

@@ -17,7 +17,7 @@ from physics.summary import parts_repr, shown
 from physics.undo import undo_on_error
 from physics.world import batch_arrays, restoring
 from physics.world.report import StepReport
-from physics.world.rollout_course import Room, advance
+from physics.world.rollout_course import Room, run_wrenches
 from physics.world.snapshot import Snapshot
 from physics.world.world import World
 
@@ -170,7 +170,7 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
     with undo_on_error(restoring.remember(world) if world.plan.may_raise else None):
         if targets is not None:
             restoring.reinstate(world, initial, targets)
-        advance(world, wrenches, found._as_room(), steps, dt, every)
+        run_wrenches(world, wrenches, found._as_room(), steps, dt, every)
     return found
 
 

@@ -25,7 +25,7 @@ class Room(NamedTuple):
     report_table: np.ndarray  # (worlds, REPORT_SIZE)
 
 
-def advance(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt: float, every: int) -> None:
+def run_wrenches(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt: float, every: int) -> None:
     """Take `steps` steps of `dt` [s] with each of the wrenches (worlds, length, bodies, 6), and keep states.
 
     Every `every` wrenches they go to `into`.
