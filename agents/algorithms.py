@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -17,8 +18,12 @@ from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 import physics
 from agents.config import RunConfig
 from agents.features import GoalDifference
+from physics.keywords import nearest_first
 from rigid_env import RigidVecEnv
 from rigid_env.envs.named import not_there
+
+# How Python, and `physics.keywords`, say that there is no such argument.
+UNKNOWN_ARGUMENT = ("unexpected keyword argument", "has no argument")
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
@@ -56,6 +61,10 @@ def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any
         return maker(env, **arguments)
     except gym.error.UnregisteredEnv as error:
         raise not_there(env) from error
+    except TypeError as error:
+        if any(words in str(error) for words in UNKNOWN_ARGUMENT):
+            raise ValueError(f"env_kwargs: {error}") from error
+        raise
 
 
 def make_training_env(config: RunConfig) -> RigidVecEnv:
@@ -88,6 +97,10 @@ def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, An
         If `torch.nn` has no such activation, or an entry has keys that nothing reads.
     """
     arguments = dict(config.algorithm)
+    known = [*inspect.signature(CLASSES[config.algo]).parameters, "hindsight", "action_noise"]
+    for name in arguments.keys() - set(known):
+        allowed = ", ".join(nearest_first(name, known))
+        raise ValueError(f"algorithm.{name} is no argument of {config.algo}; allowed are {allowed}")
     policy = dict(arguments.pop("policy_kwargs", {}))
     if "activation_fn" in policy:
         name = policy["activation_fn"]

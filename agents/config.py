@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
+from filelock import FileLock, Timeout
 
 HYPERPARAMETERS = Path(__file__).with_name("hyperparameters.yml")
 
 ALGORITHMS = ("ppo", "sac")
+
+LOCK = ".lock"  # in the folder of a run
+
+# Fields that may change while a run goes on from its checkpoint.
+CHANGEABLE = ("target", "max_steps", "threads")
 
 
 @dataclass(frozen=True)
@@ -209,3 +219,42 @@ class RunFolder:
         if not self.config.is_file():
             raise ValueError(f"run is {str(self.path)!r}; allowed is the folder of a run, with a config.yaml")
         return RunConfig(**yaml.safe_load(self.config.read_text(encoding="utf-8")))
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes from writing into the run, as a context; it ends with the process, however that ends.
+
+        Raises
+        ------
+        ValueError
+            If another one writes into it.
+        """
+        lock = FileLock(self.path / LOCK)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            raise ValueError(f"run is {str(self.path)!r}, which another process works on; allowed is to wait") from None
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def discard(self) -> None:
+        """Remove the folder if nothing was written into it, and the one above if that was all."""
+        if {path.name for path in self.path.iterdir()} <= {LOCK}:
+            shutil.rmtree(self.path)
+            with suppress(OSError):
+                self.path.parent.rmdir()
+
+
+def make_folder(out: Path, config: RunConfig) -> RunFolder:
+    """Make a folder in `out` that did not exist, named by what is trained and when; no two processes get the same."""
+    name = f"{config.env.rpartition('/')[2]}-{config.algo}-s{config.seed}-{time.strftime('%Y%m%d-%H%M%S')}"
+    path, count = out / name, 1
+    while True:
+        try:
+            path.mkdir(parents=True)
+            return RunFolder(path)
+        except FileExistsError:
+            count += 1
+            path = out / f"{name}-{count}"

@@ -58,6 +58,8 @@ class History:
     window : deque of (success, return, length)
     noise : ActionNoise, optional
         Of the exploration, at the checkpoint: Stable-Baselines3 resets it where learning goes on.
+    reached : float
+        Largest target that was reached, 0 without one.
     """
 
     seconds: float = 0.0
@@ -68,6 +70,7 @@ class History:
     points: list[CurvePoint] = field(default_factory=list)
     window: deque[tuple[bool, float, int]] = field(default_factory=lambda: deque(maxlen=WINDOW))
     noise: Any = None
+    reached: float = 0.0
 
     def add(self, success: bool, episode_return: float, length: int) -> None:
         """Count a finished episode."""

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import json
 import time
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.checkpoint import greedy, save_checkpoint
 from agents.config import RunConfig, RunFolder
-from agents.curve import WINDOW, History, write_curve
+from agents.curve import WINDOW, CurvePoint, History, write_curve
 from agents.evaluate import SEED_STRIDE, evaluation_seeds, run_episodes
 from agents.progress import ProgressDisplay
 
@@ -22,6 +24,8 @@ CHECKPOINT_SHARE = 0.05  # ... or longer, so that writing them, with a large rep
 CONFIRMATION_EPISODES = 500  # of the deterministic policy on fresh seeds, before training may end
 CONFIRMATION_PAUSE = 2000  # episodes of training after a confirmation that failed
 CONFIRMATION_SEEDS = SEED_STRIDE // 2  # apart from those of the final evaluation
+
+OnCheckpoint = Callable[[Path, CurvePoint], None]
 
 
 class Supervisor(BaseCallback):
@@ -37,14 +41,24 @@ class Supervisor(BaseCallback):
     history : History
         Continued.
     display : ProgressDisplay
+    on_checkpoint : callable, optional
+        Called with the folder of each checkpoint and the last `CurvePoint`; an exception that it raises ends training.
 
     Attributes
     ----------
     is_target_reached : bool
     """
 
-    def __init__(self, config: RunConfig, run: RunFolder, history: History, display: ProgressDisplay):
+    def __init__(
+        self,
+        config: RunConfig,
+        run: RunFolder,
+        history: History,
+        display: ProgressDisplay,
+        on_checkpoint: OnCheckpoint | None = None,
+    ):
         super().__init__()
+        self._on_checkpoint = on_checkpoint
         self.config, self.run_folder, self.history, self.display = config, run, history, display
         self.is_target_reached = False
         self._last_point = self._last_checkpoint = float("-inf")
@@ -66,6 +80,8 @@ class Supervisor(BaseCallback):
         """Between two updates: the only moment at which all of the run is in a state to be kept."""
         self.history.seconds = time.perf_counter() - self._start
         self.is_target_reached = self._is_confirmed()
+        if self.is_target_reached:
+            self.history.reached = self.config.target
         if self.is_target_reached or self.history.seconds - self._last_point >= POINT_EVERY:
             self._add_point()
         if self.is_target_reached or self.history.seconds - self._last_checkpoint >= self._checkpoint_every:
@@ -130,8 +146,10 @@ class Supervisor(BaseCallback):
         self._monitor.flush()
         self.history.monitor_size = self._monitor.tell()
         self.history.noise = getattr(self.model, "action_noise", None)
-        save_checkpoint(self.run_folder.checkpoints, self.model, self.history)
+        place = save_checkpoint(self.run_folder.checkpoints, self.model, self.history)
         write_curve(self.history.points, self.run_folder.curve)
+        if self._on_checkpoint is not None:
+            self._on_checkpoint(place, self.history.points[-1])
         self._last_checkpoint = self.history.seconds
         self._checkpoint_every = max(CHECKPOINT_EVERY, (time.perf_counter() - start) / CHECKPOINT_SHARE)
 

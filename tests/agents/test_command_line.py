@@ -34,8 +34,8 @@ def test_train_evaluate_record_resume(small, tmp_path, monkeypatch, is_exhaustiv
     if not is_exhaustive:  # a short video
         make = record.make_single_env
         monkeypatch.setattr(record, "make_single_env", lambda env, **kw: make(env, max_episode_steps=20, **kw))
-    monkeypatch.setattr(train, "EVALUATION_EPISODES", 10)
-    monkeypatch.setattr(train, "VIDEO_EPISODES", 1)
+    monkeypatch.setattr("agents.run.EVALUATION_EPISODES", 10)
+    monkeypatch.setattr("agents.run.VIDEO_EPISODES", 1)
     result = run(train, *small, "--json", tmp_path / "r.json")
     assert result.exit_code == 0, result.output
     (folder,) = (tmp_path / "runs").iterdir()
@@ -44,7 +44,7 @@ def test_train_evaluate_record_resume(small, tmp_path, monkeypatch, is_exhaustiv
     assert numbers["steps"] == 2048
     assert numbers["evaluation"]["episodes"] == 10
     expected = {"config.yaml", "model.zip", "checkpoints", "monitor.csv", "curve.csv", "curve.png"}
-    expected |= {"evaluation.json", "result.json", "episodes.mp4"}
+    expected |= {"evaluation.json", "result.json", "episodes.mp4", ".lock"}
     assert {path.name for path in folder.iterdir()} == expected
 
     result = run(evaluate, folder, "--episodes", 10, "--json", tmp_path / "e.json")

@@ -148,14 +148,6 @@ def test_partial_checkpoint_is_not_found(tmp_path):
     assert [path.name for path in list_checkpoints(tmp_path)] == ["000000000512"]
 
 
-@pytest.mark.parametrize("tiny", sweep(TINY_ALGORITHMS, ("ppo",)), indirect=True)
-def test_finished_run_asks_for_more_steps(tiny, tmp_path):
-    run = RunFolder(tmp_path / "run")
-    train(tiny, run, console=QUIET)
-    with pytest.raises(ValueError, match=f"max_steps is {tiny.max_steps}; allowed is more than"):
-        train(tiny, run, is_resumed=True, console=QUIET)
-
-
 @pytest.mark.exhaustive
 @pytest.mark.train
 def test_learns_to_reach_in_a_narrow_box(tmp_path):
