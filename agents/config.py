@@ -23,6 +23,10 @@ LOCK = ".lock"  # in the folder of a run
 CHANGEABLE = ("target", "max_steps", "threads")
 
 
+class RunInUse(ValueError):
+    """Error of a run that another process works on."""
+
+
 @dataclass(frozen=True)
 class RunConfig:
     """Everything that decides a run; written to `config.yaml` in its folder.
@@ -226,14 +230,14 @@ class RunFolder:
 
         Raises
         ------
-        ValueError
+        RunInUse
             If another one writes into it.
         """
         lock = FileLock(self.path / LOCK)
         try:
             lock.acquire(timeout=0)
         except Timeout:
-            raise ValueError(f"run is {str(self.path)!r}, which another process works on; allowed is to wait") from None
+            raise RunInUse(f"run is {str(self.path)!r}, which another process works on; allowed is to wait") from None
         try:
             yield
         finally:

@@ -72,9 +72,10 @@ def run_or_resume(
     ------
     Interrupted
         On Ctrl-C: the next call goes on.
+    RunInUse
+        If another process works on the run.
     ValueError
-        If another process works on the run, if its folder is that of a run with other settings, or if the algorithm or
-        the environment refuses an argument.
+        If its folder is that of a run with other settings, or the algorithm or the environment refuses an argument.
     """
     start, run, console = time.perf_counter(), RunFolder(Path(folder)), console or make_console()
     with run.locked():

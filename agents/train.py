@@ -79,6 +79,9 @@ def main(
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
     resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help=RESUME_HELP)] = None,
     out: Annotated[Path, typer.Option(help="Where the folders of runs are made.")] = Path("runs"),
+    folder: Annotated[
+        Path | None, typer.Option(help="Folder of the run, begun or gone on with; instead of --out.")
+    ] = None,
     video: Annotated[bool, typer.Option(help="Record some episodes at the end.")] = True,
     tensorboard: Annotated[bool, typer.Option(help="Write diagnostics for TensorBoard.")] = False,
     json_file: JsonOption = None,
@@ -95,7 +98,10 @@ def main(
         config = choose_config(resume, hyperparameters, fixed)
         config = change(config, target=target, max_steps=max_steps, threads=threads)
         config = apply_settings(config, chosen)
-        run = make_folder(out, config) if resume is None else RunFolder(resume)
+        if resume is not None and folder is not None:
+            raise ValueError(f"--folder is {str(folder)!r}, with --resume; allowed is one of them")
+        given = resume or folder
+        run = make_folder(out, config) if given is None else RunFolder(given)
         console.print(f"run         {run.path}", soft_wrap=True)
         if read_result(run, config) is not None:
             console.print("This run is complete: a larger --max-steps or --target trains on.")

@@ -18,11 +18,14 @@ EXTRAS: dict[str, dict[str, str]] = {
         "stable_baselines3": "Stable-Baselines3",
         "matplotlib": "matplotlib",
         "yaml": "PyYAML",
+        "filelock": "filelock",
         "pygame": "pygame",
         "PIL": "Pillow",
     },
     "plot": {"matplotlib": "matplotlib"},
     "view": {"viser": "viser"},
+    "ray": {"ray": "Ray"},
+    "submitit": {"submitit": "submitit"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
@@ -42,7 +45,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
     Parameters
     ----------
-    extra : {"render", "plot", "view", "agents", "bench", "peers"}
+    extra : {"render", "plot", "view", "agents", "ray", "submitit", "bench", "peers"}
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str

@@ -14,16 +14,16 @@ UNBROKEN = 10_000
 LABEL_WIDTH = 11  # of the labels that `say` prints [characters]
 
 
-def make_console() -> Console:
-    """Make a console on standard output that prints text as it is.
+def make_console(is_error: bool = False) -> Console:
+    """Make a console on standard output, or on standard error, that prints text as it is.
 
     Square brackets and colons mean nothing to it: a unit such as ``[s]`` is printed. A terminal sets the width, or the
     variable ``COLUMNS``. Without either, in a pipe or a file, no line is broken.
     """
-    console = Console(markup=False, emoji=False, highlight=False)
+    console = Console(markup=False, emoji=False, highlight=False, stderr=is_error)
     if console.is_terminal or os.environ.get("COLUMNS", "").isdigit():
         return console
-    return Console(markup=False, emoji=False, highlight=False, width=UNBROKEN)
+    return Console(markup=False, emoji=False, highlight=False, stderr=is_error, width=UNBROKEN)
 
 
 def progress_bar(console: Console, has_thread: bool = True) -> Progress:

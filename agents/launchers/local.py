@@ -1,0 +1,36 @@
+"""Trials in processes of this machine."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+
+from agents.launchers.trial import RETRIES, Outcome, run_trial
+from agents.trials import Trial
+
+
+def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = None) -> Iterator[Outcome]:
+    """See `trial.Launch`; `address` is not used. A process that dies takes the others' work since their checkpoints."""
+    left = {trial.name: trial for trial in trials}
+    for _ in range(1 + RETRIES):
+        try:
+            for outcome in _run_all(list(left.values()), out, jobs):
+                del left[outcome.name]
+                yield outcome
+            return
+        except BrokenProcessPool:
+            continue
+    for name in left:
+        yield Outcome(name, None, f"its process ended {1 + RETRIES} times; is there memory for {jobs} of them?")
+
+
+def _run_all(trials: Sequence[Trial], out: Path, jobs: int) -> Iterator[Outcome]:
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        for future in as_completed([pool.submit(run_trial, t.name, t.config, str(out)) for t in trials]):
+            yield future.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

@@ -1,0 +1,125 @@
+"""Train one agent for each of many settings: ``python -m agents.sweep ENV... --seeds 0-4 --set NAME=A,B --out DIR``.
+
+Folders are named by the settings. The same command goes on with what was ended, anywhere that sees `DIR`: each trial
+is `agents.train.run_or_resume`. What is complete stands in ``DIR/results.json``.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from agents.config import HYPERPARAMETERS, RunFolder
+from agents.evaluate import write_json
+from agents.launchers.trial import Launch, Outcome
+from agents.run import read_result
+from agents.trials import Trial, make_trials, parse_grid, parse_seeds
+from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
+
+LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", "print": "printed"}
+INTERRUPTED = 130
+
+
+def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
+    """Results of the complete trials, by name."""
+    found = {trial.name: read_result(RunFolder(out / trial.name), trial.config) for trial in trials}
+    return {name: result for name, result in found.items() if result is not None}
+
+
+def sweep(
+    trials: Sequence[Trial], out: Path, launch: Launch, jobs: int, address: str | None, console: Console
+) -> list[Outcome]:
+    """Run the trials that are not complete; a line tells each that ends.
+
+    Returns
+    -------
+    list of Outcome
+        One for each that is complete or has failed, in the order of the trials.
+    """
+    ended = {name: Outcome(name, result) for name, result in complete(trials, out).items()}
+    left = [trial for trial in trials if trial.name not in ended]
+    if ended:
+        console.print(f"{len(ended)} of {len(trials)} trials are complete already", highlight=False)
+    with progress_bar(console) as bar:
+        task = bar.add_task("trials", total=len(trials), completed=len(ended))
+        for outcome in launch(left, out, jobs, address) if left else ():
+            ended[outcome.name] = outcome
+            bar.update(task, completed=len(ended))
+            console.print(f"{len(ended)} of {len(trials)}  {_told(outcome)}", highlight=False, soft_wrap=True)
+    return [ended[trial.name] for trial in trials if trial.name in ended]
+
+
+def _told(outcome: Outcome) -> str:
+    if outcome.result is None:
+        return f"{outcome.name}: {outcome.error}"
+    rate, steps = outcome.result["evaluation"]["success_rate"], outcome.result["steps"]
+    return f"{outcome.name}: success {rate:.1%} after {steps / 1e6:.2f} M steps"
+
+
+def make_table(outcomes: Sequence[Outcome]) -> Table:
+    """Success of each trial on fresh episodes."""
+    table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
+    for name, result, error in outcomes:
+        if result is None:
+            table.add_row(name, "failed", error, "", "", "")
+            continue
+        judged = result["evaluation"]
+        low, high = judged["interval"]
+        table.add_row(
+            name, f"{judged['success_rate']:.1%}", f"{low:.1%} to {high:.1%}", f"{judged['return_mean']:.2f}",
+            f"{result['steps'] / 1e6:.2f}", f"{result['training_seconds']:.0f}",
+        )  # fmt: skip
+    return table
+
+
+def main(
+    env: Annotated[list[str], typer.Argument(help="Gymnasium ids, or module:id.", show_default=False)],
+    seeds: Annotated[str, typer.Option(help="Numbers and ranges: 0-4 or 1,3,7.")] = "0",
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="NAME=A,B", help="Values of anything in config.yaml, each of them tried."
+        ),
+    ] = None,
+    accuracy: Annotated[str | None, typer.Option(help="Presets of the engine in training, with commas.")] = None,
+    algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
+    hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
+    out: Annotated[Path, typer.Option(help="Folder of the sweep; every worker sees it.")] = Path("sweep"),
+    launcher: Annotated[str, typer.Option(help=f"{', '.join(LAUNCHERS)}.")] = "local",
+    jobs: Annotated[int, typer.Option(min=1, help="Trials at once.")] = 2,
+    address: Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")] = None,
+) -> None:
+    """Train one agent for each environment, seed and combination of settings, and compare them.
+
+    The same command goes on with a sweep that was ended.
+    """
+    console = make_console(is_error=launcher == "print")  # its lines alone are on standard output
+    try:
+        grid = parse_grid([*(settings or []), *([f"accuracy={accuracy}"] if accuracy else [])])
+        trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
+        if launcher not in LAUNCHERS:
+            raise ValueError(f"launcher is {launcher!r}; allowed are {', '.join(LAUNCHERS)}")
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    launch = importlib.import_module(f"agents.launchers.{LAUNCHERS[launcher]}").launch
+    out.mkdir(parents=True, exist_ok=True)
+    try:
+        outcomes = sweep(trials, out.resolve(), launch, jobs, address, console)
+    except KeyboardInterrupt:
+        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
+        raise typer.Exit(INTERRUPTED) from None
+    if outcomes:
+        write_json(out / "results.json", {"trials": [{"name": each.name, "result": each.result, "error": each.error}
+                                                     for each in outcomes]})  # fmt: skip
+        console.print(make_table(outcomes))
+    if any(each.result is None for each in outcomes):
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    run_program(main)
