@@ -19,6 +19,7 @@ from agents.evaluate import write_json
 from agents.launchers.trial import Launch, Outcome
 from agents.run import read_result
 from agents.trials import Trial, make_trials, parse_grid, parse_seeds
+from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
 
 LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", "print": "printed"}
@@ -64,9 +65,9 @@ def _told(outcome: Outcome) -> str:
 def make_table(outcomes: Sequence[Outcome]) -> Table:
     """Success of each trial on fresh episodes."""
     table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
-    for name, result, error in outcomes:
+    for name, result, _ in outcomes:
         if result is None:
-            table.add_row(name, "failed", error, "", "", "")
+            table.add_row(name, "failed", "", "", "", "")
             continue
         judged = result["evaluation"]
         low, high = judged["interval"]
@@ -82,9 +83,7 @@ def main(
     seeds: Annotated[str, typer.Option(help="Numbers and ranges: 0-4 or 1,3,7.")] = "0",
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set", metavar="NAME=A,B", help="Values of anything in config.yaml, each of them tried."
-        ),
+        typer.Option("--set", metavar="NAME=A,B", help="Values of anything in config.yaml, each of them tried."),
     ] = None,
     accuracy: Annotated[str | None, typer.Option(help="Presets of the engine in training, with commas.")] = None,
     algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
@@ -100,7 +99,9 @@ def main(
     """
     console = make_console(is_error=launcher == "print")  # its lines alone are on standard output
     try:
-        grid = parse_grid([*(settings or []), *([f"accuracy={accuracy}"] if accuracy else [])])
+        grid = parse_grid(settings or [])
+        if accuracy is not None:
+            grid["accuracy"] = [checked_preset(name.strip()) for name in accuracy.split(",")]
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
         if launcher not in LAUNCHERS:
             raise ValueError(f"launcher is {launcher!r}; allowed are {', '.join(LAUNCHERS)}")

@@ -115,9 +115,7 @@ def parse_grid(assignments: Iterable[str]) -> dict[str, list[Any]]:
     for text in assignments:
         name, sign, values = text.partition("=")
         if not (sign and name and values):
-            raise ValueError(
-                f"--set is {text!r}; allowed is NAME=VALUE,..., as algorithm.learning_rate=1e-3,3e-4"
-            )
+            raise ValueError(f"--set is {text!r}; allowed is NAME=VALUE,..., as algorithm.learning_rate=1e-3,3e-4")
         if name in grid:
             raise ValueError(f"--set names {name} twice; allowed is once, with commas between the values")
         grid[name] = [parse_value(value, name) for value in _split(values)]
