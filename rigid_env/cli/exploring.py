@@ -216,14 +216,28 @@ def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Consol
     return [share.to_dict() for share in found]
 
 
-@app.command(short_help="Compile the common plans ahead.")
-def warmup(json: Json = None) -> None:
-    """Compile the common plans ahead; what is compiled already takes no time."""
+@app.command(short_help="Compile kernels ahead.")
+def warmup(
+    what: Annotated[
+        list[str] | None,
+        typer.Argument(
+            help="Ids of environments, module:id, scenes and scene files; without any, the common ones.",
+            autocompletion=names.complete_scene,
+        ),
+    ] = None,
+    accuracy: Annotated[
+        str, typer.Option(help="Presets, with commas.", autocompletion=names.complete_presets)
+    ] = "balanced",
+    json: Json = None,
+) -> None:
+    """Compile kernels ahead; what is compiled already takes no time."""
     with told_errors():
-        from rigid_env.lab.warmup import jobs, warm
+        from rigid_env.lab.warmup import jobs, jobs_of, warm
 
         make_parents(json)
-        console, todo, done = make_console(), jobs(), []
+        presets = [names.checked_preset(each.strip()) for each in accuracy.split(",")]
+        console, done = make_console(), []
+        todo = jobs_of(what, presets) if what else jobs()
         with progress_bar(console) as progress:
             task = progress.add_task("compiling", total=len(todo))
             for job, result in zip(todo, warm(todo)):

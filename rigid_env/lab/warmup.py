@@ -1,10 +1,11 @@
-"""Command `rigid-env warmup`: take one step of all common scenes and environments, to compile their kernels."""
+"""Command `rigid-env warmup`: take one step of environments and scenes, to compile their kernels."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -12,8 +13,10 @@ import numpy as np
 import physics
 from physics import scenes
 from physics.kernels.compile.decorators import backend
+from rigid_env.envs.named import make_named
 from rigid_env.envs.registration import SCENE_ID
 from rigid_env.lab.measure.environments import environment_ids
+from rigid_env.tasks.scene_source import SCENE_FILES, find_scene
 
 ACCURACIES = ("balanced", "fast")
 FIRST_SCENE = "drop"  # the three-wall box: at all of `ACCURACIES`, the other scenes at the first
@@ -66,6 +69,27 @@ def jobs() -> list[Job]:
     return found
 
 
+def jobs_of(names: Sequence[str], accuracies: Sequence[str]) -> list[Job]:
+    """List the jobs of environments, scenes and scene files, by name, at each of the accuracies.
+
+    Raises
+    ------
+    ValueError
+        There is no such environment or scene.
+    """
+    found = []
+    for name in names:
+        if name in scenes.SCENES or Path(name).suffix.lower() in SCENE_FILES:
+            scene = find_scene(name).scene
+            found += [_scene_job(name, accuracy, scene) for accuracy in accuracies]
+        else:
+            env = make_named(name, "what", scenes.SCENES)
+            if env.unwrapped.spec is None:
+                raise ValueError(f"what is {name!r}, a class; allowed are registered environments, scenes and files")
+            found += [Job(f"environment {name}", each, _stepper(env.unwrapped.spec.id, each)) for each in accuracies]
+    return found
+
+
 def warm(todo: list[Job]) -> Iterator[Warmed]:
     """Run jobs one after the other, and yield the time of each."""
     for job in todo:
@@ -76,9 +100,9 @@ def warm(todo: list[Job]) -> Iterator[Warmed]:
         yield Warmed(job.name, job.accuracy, seconds, count())
 
 
-def _scene_job(name: str, accuracy: str) -> Job:
+def _scene_job(name: str, accuracy: str, scene: physics.Scene | None = None) -> Job:
     def step() -> None:
-        world = physics.World(scenes.by_name(name), accuracy=accuracy)
+        world = physics.World(scene or scenes.by_name(name), accuracy=accuracy)
         world.step()
         physics.diagnose(world)
         world.contacts()

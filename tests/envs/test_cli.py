@@ -221,6 +221,20 @@ def test_warmup_covers_environments_and_scenes_once():
     assert len(in_scenes) == len(plans)
 
 
+def test_warmup_takes_environments_scenes_and_files(tmp_path):
+    file = tmp_path / "mine.toml"
+    physics.save_scene(scenes.by_name("drop"), file)
+    path = tmp_path / "warmup.json"
+    names = ("drop", str(file), "rigid_env/BlockReach-v0")
+    run("warmup", *names, "--accuracy", "balanced,fast", "--json", str(path))
+    plans = json.loads(path.read_text(encoding="utf-8"))["plans"]
+    assert [(plan["name"].split(" ", 1)[1], plan["accuracy"]) for plan in plans] == [
+        (name, accuracy) for name in names for accuracy in ("balanced", "fast")
+    ]
+    assert [plan["compiled"] for plan in plans[2:4]] == [0, 0]  # the file is the scene before
+    assert "'Nothing-v7'" in run("warmup", "Nothing-v7", code=2)
+
+
 def test_second_warmup_compiles_nothing(tmp_path, monkeypatch):
     few = [job for job in rigid_env.lab.warmup.jobs() if "scene drop" in job.name and job.accuracy == "balanced"]
     assert len(few) == 1
