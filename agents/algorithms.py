@@ -22,8 +22,8 @@ from physics.keywords import nearest_first
 from rigid_env import RigidVecEnv
 from rigid_env.envs.named import not_there
 
-# How Python, and `physics.keywords`, say that there is no such argument.
-UNKNOWN_ARGUMENT = ("unexpected keyword argument", "has no argument")
+# How Python, and `physics.keywords` with it, says that there is no such argument.
+UNKNOWN_ARGUMENT = "unexpected keyword argument"
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
@@ -62,7 +62,7 @@ def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any
     except gym.error.UnregisteredEnv as error:
         raise not_there(env) from error
     except TypeError as error:
-        if any(words in str(error) for words in UNKNOWN_ARGUMENT):
+        if UNKNOWN_ARGUMENT in str(error):
             raise ValueError(f"env_kwargs: {error}") from error
         raise
 

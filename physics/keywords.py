@@ -54,7 +54,8 @@ def known_keywords(target: Function) -> Function:
     Raises
     ------
     TypeError
-        When called: ``World has no argument 'acuracy' (given: 'fast'); allowed are accuracy, scene, ...``.
+        When called: ``World got an unexpected keyword argument 'acuracy' (given: 'fast'); allowed are accuracy, ...``.
+        Libraries look for Python's own words in it (TorchRL).
     """
     if isinstance(target, type):
         kind: Any = target
@@ -80,6 +81,7 @@ def _checked(function: Callable, name: str, first: int = 0) -> Callable:
 
     def _unknown(key: str, kwargs: dict) -> TypeError:
         allowed = ", ".join(nearest_first(key, keywords)) or "none"
-        return TypeError(f"{name} has no argument {key!r} (given: {reprlib.repr(kwargs[key])}); allowed are {allowed}")
+        told = f"{name} got an unexpected keyword argument {key!r} (given: {reprlib.repr(kwargs[key])})"
+        return TypeError(f"{told}; allowed are {allowed}")
 
     return checked

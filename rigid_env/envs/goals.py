@@ -8,11 +8,15 @@ from gymnasium import spaces
 from rigid_env.tasks import Task
 from rigid_env.tasks.goal import GoalTask
 
+METHODS = ("compute_reward", "compute_terminated", "compute_truncated")
+"""Functions of goals alone, as Gymnasium-Robotics has them; they look at no environment."""
+
 
 def lend_goals(task: Task, env) -> None:
-    """Give an environment the method `compute_reward` of a task with goals; other environments must lack it."""
+    """Give an environment the methods `METHODS` of a task with goals; other environments must lack them."""
     if isinstance(task, GoalTask):
-        env.compute_reward = task.compute_reward
+        for name in METHODS:
+            setattr(env, name, getattr(task, name))
 
 
 class GoalSource:

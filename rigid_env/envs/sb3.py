@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from physics.summary import shown
 from rigid_env.envs import vector_infos as infos_of_batches
+from rigid_env.envs.goals import METHODS
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.extras import require
 
@@ -23,9 +24,6 @@ try:
 except ImportError:
     require("agents", "torch", "stable_baselines3", purpose="rigid_env.envs.sb3")
     raise
-
-OF_NO_ENVIRONMENT = ("compute_reward",)
-"""Methods that change nothing and have the same result in all environments."""
 
 
 class RigidVecEnv(VecEnv):
@@ -243,9 +241,9 @@ class RigidVecEnv(VecEnv):
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
         """Call a method of the vector environment once, for all environments; its result, once per index.
 
-        A method that looks at no environment, `compute_reward`, may be called for some of them.
+        A method that looks at no environment (`goals.METHODS`) may be called for some of them.
         """
-        if method_name not in OF_NO_ENVIRONMENT:
+        if method_name not in METHODS:
             self._require_all("env_method", indices)
         result = getattr(self.vector_env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]

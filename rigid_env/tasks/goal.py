@@ -100,13 +100,36 @@ class GoalTask(Task):
         ValueError
             Goals of other sizes.
         """
+        shortfall = self._shortfall(achieved_goal, desired_goal)
+        return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
+
+    def compute_terminated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
+        """Whether an episode would end by achieving one goal where another is wanted.
+
+        Arguments and errors as of `compute_reward`.
+
+        Returns
+        -------
+        (...,) bool
+            Goals that are reached, of a subclass with ``ends_on_success``; else none.
+        """
+        return (self._shortfall(achieved_goal, desired_goal) <= 1.0) & self.ends_on_success
+
+    def compute_truncated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
+        """Whether goals end an episode before its time, (...,) bool: none does, only the limit of steps.
+
+        Arguments and errors as of `compute_reward`.
+        """
+        return np.zeros_like(self._shortfall(achieved_goal, desired_goal), dtype=bool)
+
+    def _shortfall(self, achieved_goal, desired_goal) -> np.ndarray:
+        """`shortfall` of goals that are checked."""
         achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
         size = self._goals.size
         for name, goal in (("achieved_goal", achieved), ("desired_goal", desired)):
             if goal.shape[-1:] != (size,):
                 raise ValueError(f"{name} has shape {goal.shape}; allowed are {size} numbers along the last axis")
-        shortfall = self.shortfall(achieved, desired)
-        return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
+        return self.shortfall(achieved, desired)
 
     def is_reached(self, achieved_goal, desired_goal) -> np.ndarray:
         """Goals (...,) bool that count as reached."""

@@ -41,11 +41,20 @@ def throw(ball: Ball, speed: float = 1.0) -> float:
     [
         (
             lambda: Room(2.0, acuracy="fast"),
-            "Room has no argument 'acuracy' (given: 'fast'); allowed are accuracy, width",
+            "Room got an unexpected keyword argument 'acuracy' (given: 'fast'); allowed are accuracy, width",
         ),
-        (lambda: Ball(1.0, mas=2), "Ball has no argument 'mas' (given: 2); allowed are mass, radius, pos"),
-        (lambda: throw(Ball(1.0), sped=3), "throw has no argument 'sped' (given: 3); allowed are speed, ball"),
-        (lambda: dataclasses.replace(Ball(1.0), Pos=1), "Ball has no argument 'Pos' (given: 1); allowed are pos"),
+        (
+            lambda: Ball(1.0, mas=2),
+            "Ball got an unexpected keyword argument 'mas' (given: 2); allowed are mass, radius, pos",
+        ),
+        (
+            lambda: throw(Ball(1.0), sped=3),
+            "throw got an unexpected keyword argument 'sped' (given: 3); allowed are speed, ball",
+        ),
+        (
+            lambda: dataclasses.replace(Ball(1.0), Pos=1),
+            "Ball got an unexpected keyword argument 'Pos' (given: 1); allowed are pos",
+        ),
     ],
 )
 def test_a_misspelt_keyword_is_told_with_the_nearest_first(call, message):

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rigid_env import BlockReachEnv, TaskEnv, TaskVectorEnv, check_task
+from rigid_env.envs.goals import METHODS
 from rigid_env.tasks import Entry
 from rigid_env.tasks.block_goals import BlockReachGoal, BlockReorientGoal
 from rigid_env.tasks.goal import GoalTask
@@ -60,6 +61,9 @@ def test_the_reward_is_that_of_the_observed_goals(env_id, reward, is_exhaustive)
     np.testing.assert_array_equal(envs.unwrapped.compute_reward(obs["achieved_goal"], other), each)
     stack = np.stack([obs["achieved_goal"]] * 2), np.stack([other] * 2)
     np.testing.assert_array_equal(envs.unwrapped.compute_reward(*stack), [each, each])
+    for ends in (envs.unwrapped.compute_terminated, envs.unwrapped.compute_truncated):  # as no episode ends by a goal
+        np.testing.assert_array_equal(ends(obs["achieved_goal"], obs["achieved_goal"], {}), np.zeros(worlds, bool))
+        assert ends(*stack).shape == (2, worlds)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -234,12 +238,22 @@ def test_what_a_batch_cannot_do_for_some_of_its_worlds_is_refused_still():
         envs.env_method("render", indices=[0])
 
 
+def test_a_goal_ends_an_episode_where_the_task_says_so():
+    class Ending(BlockReachGoal):
+        ends_on_success = True
+
+    env = TaskEnv(Ending)
+    goal = np.zeros(4)
+    np.testing.assert_array_equal(env.compute_terminated([goal, goal + 9.0], [goal, goal]), [True, False])
+    assert not env.compute_truncated(goal, goal)
+
+
 def test_refusals():
     with pytest.raises(ValueError, match=r"reward is 'shaped'.*sparse, dense"):
         TaskEnv(BlockReachGoal, reward="shaped")
     env = TaskEnv(BlockReachGoal)
     with pytest.raises(ValueError, match=r"desired_goal has shape \(3,\); allowed are 4 numbers"):
         env.compute_reward(np.zeros(4), np.zeros(3))
-    assert not hasattr(BlockReachEnv(), "compute_reward")
+    assert not any(hasattr(BlockReachEnv(), name) for name in METHODS)
     with pytest.raises(TypeError, match=r"'acuracy'.*allowed are accuracy"):
         TaskEnv(BlockReachGoal, acuracy="fast")
