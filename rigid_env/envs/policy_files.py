@@ -55,6 +55,11 @@ SETTINGS = {"PPO": "clip_range", "SAC": "target_entropy", "TD3": "policy_delay",
 DDPG is TD3 with other settings.
 """
 
+KNOWN = ", ".join((*SETTINGS, "DDPG"))
+
+OTHER_POLICIES = ("sb3_contrib", "sbx")
+"""Packages whose policies have the settings of an algorithm above, and act in another way."""
+
 Observations = np.ndarray | Mapping[str, np.ndarray]
 
 
@@ -129,11 +134,15 @@ def _algorithm(path: Path) -> str:
         told = f"allowed with the ending {MODEL} is a model of Stable-Baselines3, as its `save` writes it"
         raise ValueError(f"policy is {str(path)!r}, which is none; {told}") from None
     try:
-        keys = json.loads(settings).keys()
-        return next(algorithm for algorithm, setting in SETTINGS.items() if setting in keys)
+        kept = json.loads(settings)
+        algorithm = next(algorithm for algorithm, setting in SETTINGS.items() if setting in kept)
+        source = kept.get("policy_class", {}).get("__module__", "")
     except (ValueError, AttributeError, StopIteration):
-        known = ", ".join((*SETTINGS, "DDPG"))
-        raise ValueError(f"policy is {str(path)!r}, of an unknown algorithm; allowed are {known}") from None
+        raise ValueError(f"policy is {str(path)!r}, of an unknown algorithm; allowed are {KNOWN}") from None
+    if source.split(".")[0] in OTHER_POLICIES:
+        why = "which remembers earlier observations" if "recurrent" in source else "which Stable-Baselines3 cannot load"
+        raise ValueError(f"policy is {str(path)!r}, of {source}, {why}; allowed are {KNOWN}")
+    return algorithm
 
 
 class Network:

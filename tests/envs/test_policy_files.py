@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from itertools import pairwise
 
@@ -136,4 +137,21 @@ def test_an_archive_of_something_else_is_no_model(tmp_path):
     with zipfile.ZipFile(tmp_path / "model.zip", "w") as file:
         file.writestr("data", '{"tree": 3}')
     with pytest.raises(ValueError, match="of an unknown algorithm; allowed are PPO"):
+        load_policy(tmp_path / "model.zip")
+
+
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("sb3_contrib.common.recurrent.policies", "which remembers earlier observations"),
+        ("sb3_contrib.crossq.policies", "which Stable-Baselines3 cannot load"),
+    ],
+)
+def test_a_policy_that_would_act_in_another_way_is_refused(source, why, tmp_path):
+    """The settings of its algorithm are those of PPO or SAC, by which the file would be read."""
+    import zipfile
+
+    with zipfile.ZipFile(tmp_path / "model.zip", "w") as file:
+        file.writestr("data", json.dumps({"clip_range": 0.2, "policy_class": {"__module__": source}}))
+    with pytest.raises(ValueError, match=rf"model.zip', of {source}, {why}; allowed are PPO"):
         load_policy(tmp_path / "model.zip")
