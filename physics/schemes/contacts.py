@@ -23,8 +23,8 @@ class Contacts(NamedTuple):
 
     Force and impulse are those of the last resting stage, as the contact solver worked them out. A stage is the whole
     physics step where the accuracy has one substep and nothing collides in the step. Otherwise it is the end of the
-    step: the last substep, or what is left of it after the last collision. **Impulses of collisions are not among
-    them**: the memory does not hold them. A collision so slow that a resting stage stops it is part of that stage.
+    step: the last substep, or what is left of it after the last collision. Impulses of collisions are not among them:
+    `physics.World.read_impacts` tells those. A collision so slow that a resting stage stops it is part of that stage.
 
     Event-driven accuracies have no stages where bodies meet walls only. The force is then the last one that was worked
     out in the step, and the impulse is this force times the physics step.
@@ -72,6 +72,8 @@ def no_contacts(worlds: int, rows: int) -> Contacts:
 def keep_strongest(kept, place, size, strongest):
     """Append a contact to those that are kept, where these are full in place of the weakest: how many are kept then."""
     rows = strongest.size.shape[0]
+    if rows == 0:
+        return 0
     if kept == rows:
         weakest = 0
         for k in range(1, rows):

@@ -97,6 +97,7 @@ def put(world: Batch, snapshot: Snapshot, at_places: Places) -> None:
         _put_actuation(world, snapshot, at_places)
     if is_all:
         world.time = snapshot.time
+    world.forget_impacts(where)
     if world.recorder is not None:
         world.recorder.changed(where)
 
