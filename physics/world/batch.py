@@ -91,9 +91,9 @@ class Batch(Exclusive):
     event_log, event_counts : (worlds * bodies, room, EVENT_SIZE) float64, (worlds * bodies,) int64
         Events of the last call; see `World.make_event_room`.
     impacts : KeptImpacts or None
-        Collisions of a step of several calls, where a user asks for them: `World.keep_impacts`.
+        Impacts of a step of several calls, where a user asks for them: `World.keep_impacts`.
     is_plain : bool
-        A call is the kernel alone: no field is told the time, and no collision is kept.
+        A call is the kernel alone: no field is told the time, and no impact is kept.
     is_bound : bool
         A `Stepper` has bound the arrays.
     actuation : ActuatorState or None
@@ -172,12 +172,12 @@ class Batch(Exclusive):
             self.impacts.note(self)
 
     def continue_step(self) -> None:
-        """Let the next call go on with the step of the last one: `World.read_impacts` tells the collisions of both."""
+        """Let the next call go on with the step of the last one: `World.read_impacts` tells the impacts of both."""
         if self.impacts is not None:
             self.impacts.go_on(self)
 
     def forget_impacts(self, chosen: np.ndarray | slice = slice(None)) -> None:
-        """Forget the collisions of some worlds, whose state is not that of their last step any more."""
+        """Forget the impacts of some worlds, whose state is not that of their last step any more."""
         if self.impacts is not None:
             self.impacts.forget(self, chosen)
 

@@ -1,4 +1,4 @@
-"""Impulses of collisions in the last step of a batch of worlds, read from the log of events."""
+"""Impulses of impacts in the last step of a batch of worlds, read from the log of events."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ IMPACT_ROOM = 256
 
 
 class Impacts(NamedTuple):
-    """Collisions of n worlds in the last step: a row for each pair of bodies, or body and wall, that collided.
+    """Impacts of n worlds in the last step: a row for each pair of bodies, or body and wall, that collided.
 
     The step is the last call of `World.step` or of a `Stepper`, with all its steps and substeps; in an environment the
-    last control step. Impulses of resting contacts are not among them: `physics.schemes.contacts.Contacts`. A collision
-    so slow that a resting stage stops it is part of that stage.
+    last control step. Impulses of resting contacts are not among them: `physics.Contacts`. A meeting so slow
+    that a resting stage stops it is part of that stage.
 
     A world with more pairs than there are rows shows those with the largest impulses; of equal ones, the first. Pairs
-    are in the order of their first bodies, then of their first collisions. Rows without a pair are zero. Between a
+    are in the order of their first bodies, then of their first impacts. Rows without a pair are zero. Between a
     reset or a restored snapshot and the next step there are none.
 
     Attributes
@@ -36,13 +36,13 @@ class Impacts(NamedTuple):
     point : (n, rows, 3) float64
         Mean of the points where the impulses act, weighted by their sizes, world frame [m].
     impulse : (n, rows, 3) float64
-        Sum over the collisions of the pair, on the first body, world frame [N s]. The other body gets the opposite.
+        Sum over the impacts of the pair, on the first body, world frame [N s]. The other body gets the opposite.
     hits : (n, rows) int64
-        Collisions of the pair.
+        Impacts of the pair.
     ends : (n, rows, 2) int64
         First body; other body, or -1 - k for wall k.
     total : (n, bodies, 3) float64
-        Sum over all collisions of each body, also of those without a row, world frame [N s].
+        Sum over all impacts of each body, also of those without a row, world frame [N s].
     left_out : (n,) int64
         Events for which the log had no room: impulses of these are missing. `World.keep_impacts` takes more room.
     """
@@ -179,7 +179,7 @@ def _collect(n, world, log, pairs, out):
 
 @kernel
 def _read(indices, body, log, pairs, strongest, out):
-    """Collisions of some worlds; a chosen body comes first in its pairs."""
+    """Impacts of some worlds; a chosen body comes first in its pairs."""
     for n in range(indices.shape[0]):
         found, kept = _collect(n, indices[n], log, pairs, out), 0
         for k in range(found):
@@ -199,7 +199,7 @@ def _read(indices, body, log, pairs, strongest, out):
 
 
 def read_impacts(world: Batch, kept: KeptImpacts, indices: np.ndarray, rows: int, body: int = EVERY_BODY) -> Impacts:
-    """Read the collisions of worlds `indices` (n,) int64 in the last step; see `World.read_impacts`."""
+    """Read the impacts of worlds `indices` (n,) int64 in the last step; see `World.read_impacts`."""
     n, bodies, log = len(indices), world.body_count, kept.log(world)
     out = Impacts(
         np.zeros(n, np.int64), np.zeros((n, rows, 3)), np.zeros((n, rows, 3)), np.zeros((n, rows), np.int64),

@@ -1,4 +1,4 @@
-"""Contacts and collisions of a batch of worlds, as users read them: the part of `World` that tells what touches."""
+"""Contacts and impacts of a batch of worlds, as users read them: the part of `World` that tells what touches."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST_ROWS = 65_536
 
 
 class Touching(Batch):
-    """Part of `World` that reads contacts and collisions."""
+    """Part of `World` that reads contacts and impacts."""
 
     def read_contacts(
         self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | None = None
@@ -81,14 +81,14 @@ class Touching(Batch):
     @known_keywords
     @exclusive
     def keep_impacts(self, room: int = IMPACT_ROOM) -> None:
-        """Keep the collisions of each step from now on, for `read_impacts`; without this a step keeps none.
+        """Keep the impacts of each step from now on, for `read_impacts`; without this a step keeps none.
 
         States keep their bits. A world that has them already keeps the larger room.
 
         Parameters
         ----------
         room : int
-            Events of a body in one call of a step that there is room for; 104 bytes each. Events are collisions; of the
+            Events of a body in one call of a step that there is room for; 104 bytes each. Events are impacts; of the
             scheme ``events`` also contacts that begin, end, stick and slip. `StepReport.left_out` and
             `Impacts.left_out` count those without room.
 
@@ -112,7 +112,7 @@ class Touching(Batch):
     def read_impacts(
         self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | None = None
     ) -> Impacts:
-        """Read the collisions of many worlds in their last step.
+        """Read the impacts of many worlds in their last step.
 
         Parameters
         ----------
@@ -131,12 +131,12 @@ class Touching(Batch):
         Raises
         ------
         ValueError
-            A world or a body that is not there, rows out of range, or a last step whose collisions were not kept:
+            A world or a body that is not there, rows out of range, or a last step whose impacts were not kept:
             `keep_impacts` comes first.
         """
         if self.impacts is None or not self.impacts.is_known:
             raise ValueError(
-                "read_impacts() follows a step whose collisions were not kept; allowed is to call "
+                "read_impacts() follows a step whose impacts were not kept; allowed is to call "
                 "World.keep_impacts() before the step (rollouts keep none)"
             )
         indices, of = self._chosen(worlds), self._body(body)
@@ -152,7 +152,7 @@ class Touching(Batch):
         forces : (n, 3) float64
             On the body, of two bodies on the first one, world frame [N]. Time stepping averages them over the last
             resting stage; the event-driven scheme has those at the end of the step. A stage is the whole step unless
-            something was met in it. Then forces times step, impulses of collisions (`read_impacts`) and loads make up
+            something was met in it. Then forces times step, impulses of impacts (`read_impacts`) and loads make up
             the change of momentum, but for bodies that were pushed out of walls.
         """
         found = contacts_of_world(self, self._index(world))

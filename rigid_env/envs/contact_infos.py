@@ -1,4 +1,4 @@
-"""Contacts and collisions in infos, of single environments and of batches."""
+"""Contacts and impacts in infos, of single environments and of batches."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Reader(NamedTuple):
 
 
 class ContactInfos:
-    """Reader of a task's contacts and collisions for infos.
+    """Reader of a task's contacts and impacts for infos.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         Contacts that every info tells, those with the largest forces; see `physics.Contacts`. 0: none.
     impacts : int
         Pairs that collided in the control step that every info tells, those with the largest impulses; see
-        `physics.Impacts`. 0: none, and collisions are not kept.
+        `physics.Impacts`. 0: none, and impacts are not kept.
     camera : Camera, mapping or None
         Of pictures that `render` makes: a `rigid_env.rendering.Camera`, or a mapping of its parameters. None has the
         whole room in sight. Observations keep their own view.

@@ -39,7 +39,7 @@ class InfoMaker:
 
 
 class ContactInfoMaker:
-    """Maker of an info dict that also holds contacts or collisions of the world.
+    """Maker of an info dict that also holds contacts or impacts of the world.
 
     Parameters
     ----------

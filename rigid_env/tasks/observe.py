@@ -83,7 +83,7 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
 def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
     """Sum of the contact impulses on a body over its weight, in the last resting stage.
 
-    A stage is what the last physics step ends with: see `physics.Contacts`. Those of collisions: `impact_impulse`.
+    A stage is what the last physics step ends with: see `physics.Contacts`. Those of impacts: `impact_impulse`.
     """
     names = _names("contact impulse", body)
     read = lambda worlds: worlds.contact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731
@@ -91,7 +91,7 @@ def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH)
 
 
 def impact_impulse(body: int = 0, scale: float = IMPACT, bound: float = REACH) -> Entry:
-    """Sum of the impulses of collisions on a body over its weight, in the whole control step."""
+    """Sum of the impulses of impacts on a body over its weight, in the whole control step."""
     names = _names("impact impulse", body)
     read = lambda worlds: worlds.impact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g s", -bound, bound, read, scale)
@@ -111,7 +111,7 @@ def contact_forces(body: int = 0, count: int = 4, bound: float = REACH) -> Entry
 
 
 def impact_impulses(body: int = 0, count: int = 2, scale: float = IMPACT, bound: float = REACH) -> Entry:
-    """Impulses of a body's collisions over its weight: of each wall or body that it hit, the `count` largest."""
+    """Impulses of a body's impacts over its weight: of each wall or body that it hit, the `count` largest."""
     names = _contact_names("impulse", body, count, "impact")
     read = lambda worlds: _rows(worlds.impacts_of(body, count).impulse) / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g s", -bound, bound, read, scale)

@@ -123,16 +123,16 @@ class Worlds:
 
     @property
     def impact_impulse(self) -> np.ndarray:
-        """(n, bodies, 3) float64. Sum of the impulses of collisions on each body in the control step [N s]."""
+        """(n, bodies, 3) float64. Sum of the impulses of impacts on each body in the control step [N s]."""
         return self._impacts_of(0).total
 
     @property
     def impacts(self) -> Impacts:
-        """Collisions of the last control step, a row for each pair; see `physics.Impacts`."""
+        """Impacts of the last control step, a row for each pair; see `physics.Impacts`."""
         return self._impacts_of()
 
     def impacts_of(self, body: int, count: int) -> Impacts:
-        """Collisions of one body, always as the first body: the `count` pairs with the largest impulses."""
+        """Impacts of one body, always as the first body: the `count` pairs with the largest impulses."""
         return self._impacts_of(count, body)
 
     def _impacts_of(self, *chosen: int) -> Impacts:

@@ -22,8 +22,8 @@ def ball(y=1.0, speed=0.0, mass=2.0, radius=0.5, x=0.0, vx=0.0) -> physics.Spher
     return physics.Sphere(radius, mass, pos=(x, y, 0), linvel=(vx, speed, 0))
 
 
-def keeping(bodies, effects, walls=(FLOOR,), worlds=1, accuracy="balanced", dt=DT, **room) -> physics.World:
-    world = physics.World(physics.Scene(bodies, list(walls), effects), worlds, dt, accuracy)
+def keeping(bodies, effects, walls=(FLOOR,), worlds=1, accuracy="balanced", threads=1, **room) -> physics.World:
+    world = physics.World(physics.Scene(bodies, list(walls), effects), worlds, DT, accuracy, threads)
     world.keep_impacts(**room)
     return world
 
@@ -156,11 +156,11 @@ def rests(world: physics.World) -> bool:
 # --- rows, worlds, and what a step is -------------------------------------------------------------------------
 
 
-def thrown(worlds=3) -> physics.World:
+def thrown(worlds=3, threads=1) -> physics.World:
     """Balls of one world at a floor and a wall, thrown at other speeds in each world."""
     walls = [FLOOR, physics.HalfSpace((1, 0, 0), 0.0)]
     bodies = [ball(0.503, -3.0, x=0.514, vx=-5.0), ball(2.0, -1.0, mass=1.0, x=3.0)]
-    world = keeping(bodies, [physics.Contact(0.5, between_bodies=False)], walls, worlds)
+    world = keeping(bodies, [physics.Contact(0.5, between_bodies=False)], walls, worlds, threads=threads)
     world.set_state(linvel=world.linvel * np.arange(1.0, worlds + 1)[:, None, None])
     return world
 
@@ -179,8 +179,11 @@ def test_the_strongest_are_shown_and_all_are_counted():
 
 
 def test_a_world_has_the_same_bits_alone_and_in_a_batch():
-    world = thrown()
-    world.step()
+    world, shared = thrown(), thrown(threads=2)
+    for each in (world, shared):
+        each.step()
+    for ours, theirs in zip(shared.read_impacts(), world.read_impacts(), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
     every, some = world.read_impacts(), world.read_impacts([2, 0, 2])
     for ours, theirs in zip(some, every, strict=True):
         np.testing.assert_array_equal(ours, theirs[[2, 0, 2]])
