@@ -211,7 +211,7 @@ def test_a_restored_state_goes_on_with_the_same_collisions():
         check_equal(before, env.step(np.zeros(2))[4])
 
 
-# --- how it is asked for --------------------------------------------------------------------------------------
+# --- ways to request them --------------------------------------------------------------------------------------
 
 
 def test_gymnasium_makes_them_with_the_argument():
