@@ -99,9 +99,9 @@ class KeptImpacts:
         if not self._goes_on:
             self._earlier = []
         self.is_known, self._goes_on = True, False
-        over = world.event_counts - world.event_log.shape[1]
-        if over.max() > 0:
-            missing = np.maximum(over, 0).reshape(world.worlds, -1).sum(axis=1)
+        room = world.event_log.shape[1]
+        if world.event_counts.max() > room:
+            missing = np.maximum(world.event_counts - room, 0).reshape(world.worlds, -1).sum(axis=1)
             world.report_table[:, at.CONTACTS_LEFT_OUT] += missing
 
     def go_on(self, world: Batch) -> None:
@@ -205,8 +205,7 @@ def read_impacts(world: Batch, kept: KeptImpacts, indices: np.ndarray, rows: int
         np.zeros(n, np.int64), np.zeros((n, rows, 3)), np.zeros((n, rows, 3)), np.zeros((n, rows), np.int64),
         np.zeros((n, rows, 2), np.int64), np.zeros((n, bodies, 3)), np.zeros(n, np.int64),
     )  # fmt: skip
-    events = np.minimum(log.counts, log.room).reshape(world.worlds, -1).sum(axis=1)
-    most = int(events.max())
+    most = int(log.counts.sum())  # of a world: no more than of all
     pairs = _Pairs(
         np.empty((most, 2), np.int64), np.empty(most, np.int64), np.empty((most, 3)), np.empty((most, 3)),
         np.empty(most),
