@@ -205,7 +205,7 @@ def read_impacts(world: Batch, kept: KeptImpacts, indices: np.ndarray, rows: int
         np.zeros(n, np.int64), np.zeros((n, rows, 3)), np.zeros((n, rows, 3)), np.zeros((n, rows), np.int64),
         np.zeros((n, rows, 2), np.int64), np.zeros((n, bodies, 3)), np.zeros(n, np.int64),
     )  # fmt: skip
-    most = int(log.counts.sum())  # of a world: no more than of all
+    most = int(log.counts.sum())  # of all worlds, so that those of one fit
     pairs = _Pairs(
         np.empty((most, 2), np.int64), np.empty(most, np.int64), np.empty((most, 3)), np.empty((most, 3)),
         np.empty(most),
