@@ -28,10 +28,12 @@ from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingF
 from physics.scene.force_field import Field, field_function
 from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
 from physics.scene.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
+from physics.schemes.contacts import Contacts
 from physics.version import version as _version
 from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.run import frontier, ladder
 from physics.work_precision.truth import Truth
+from physics.world.impacts import Impacts
 from physics.world.report import Solver, Status, StepReport
 from physics.world.rollout import Rollout, rollout
 from physics.world.snapshot import Snapshot
@@ -50,6 +52,7 @@ __all__ = [
     "Body",
     "Buoyancy",
     "Contact",
+    "Contacts",
     "Diagnostics",
     "Drag",
     "Ellipsoid",
@@ -61,6 +64,7 @@ __all__ = [
     "Gravity",
     "HalfSpace",
     "Hull",
+    "Impacts",
     "Magnus",
     "Push",
     "Recorder",

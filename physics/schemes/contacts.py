@@ -19,12 +19,13 @@ class Contacts(NamedTuple):
     """Contacts of n worlds in the last physics step, in the order of `physics.World.contacts`.
 
     A world with more contacts than there are rows shows those with the largest forces; of equal forces, the first.
-    Rows without a contact are zero.
+    Rows are in the order in which the scheme keeps contacts: by body, where bodies meet walls only. Rows without a
+    contact are zero.
 
     Force and impulse are those of the last resting stage, as the contact solver worked them out. A stage is the whole
     physics step where the accuracy has one substep and nothing collides in the step. Otherwise it is the end of the
-    step: the last substep, or what is left of it after the last collision. **Impulses of collisions are not among
-    them**: the memory does not hold them. A collision so slow that a resting stage stops it is part of that stage.
+    step: the last substep, or what is left of it after the last collision. Impulses of impacts are not among them:
+    `physics.World.read_impacts` tells those. A meeting so slow that a resting stage stops it is part of that stage.
 
     Event-driven accuracies have no stages where bodies meet walls only. The force is then the last one that was worked
     out in the step, and the impulse is this force times the physics step.
@@ -72,6 +73,8 @@ def no_contacts(worlds: int, rows: int) -> Contacts:
 def keep_strongest(kept, place, size, strongest):
     """Append a contact to those that are kept, where these are full in place of the weakest: how many are kept then."""
     rows = strongest.size.shape[0]
+    if rows == 0:
+        return 0
     if kept == rows:
         weakest = 0
         for k in range(1, rows):

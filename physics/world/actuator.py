@@ -72,7 +72,9 @@ class Actuation:
             world.make(calls, steps * dt)
             return
         total = np.zeros_like(world.report_table)
-        for _ in range(steps):
+        for k in range(steps):
+            if k > 0:
+                world.continue_step()
             self.apply(wrench, dt)
             world.make(calls, dt)
             add_report(total, world.report_table)

@@ -22,6 +22,9 @@ from physics.scene.scene import Scene
 from physics.world.snapshot import KEPT
 from physics.world.step_listener import StepListener
 
+if TYPE_CHECKING:
+    from physics.world.impacts import KeptImpacts
+
 _KEPT, _KEPT_AWAKE = attrgetter(*KEPT), attrgetter(*KEPT[:-1])
 
 
@@ -87,6 +90,12 @@ class Batch(Exclusive):
         The array behind `World.report`.
     event_log, event_counts : (worlds * bodies, room, EVENT_SIZE) float64, (worlds * bodies,) int64
         Events of the last call; see `World.make_event_room`.
+    impacts : KeptImpacts or None
+        Impacts of a step of several calls, where a user asks for them: `World.keep_impacts`.
+    is_plain : bool
+        A call is the kernel alone: no field is told the time, and no impact is kept.
+    is_bound : bool
+        A `Stepper` has bound the arrays.
     actuation : ActuatorState or None
         State of the actuators.
     team : Team
@@ -128,6 +137,9 @@ class Batch(Exclusive):
     report_table: NDArray[np.float64]
     event_log: NDArray[np.float64]
     event_counts: NDArray[np.int64]
+    impacts: KeptImpacts | None
+    is_plain: bool
+    is_bound: bool
     actuation: ActuatorState | None
     team: Team
     scratch: list
@@ -140,13 +152,34 @@ class Batch(Exclusive):
 
         def advance(self, calls: Any, wrench: np.ndarray, steps: int, dt: float) -> None: ...
 
+        def _make_event_room(self, room: int) -> None: ...
+
     def make(self, calls: list[Work], duration: float) -> None:
         """Make the kernel calls of a time [s]."""
+        if self.is_plain:
+            self.team.run(calls)
+        else:
+            self._make_with_more(calls)
+        self.time += duration
+
+    def _make_with_more(self, calls: list[Work]) -> None:
+        """Make the calls, and what belongs to them."""
         if self.plan.fields:
             self._make_with_fields(calls)
         else:
             self.team.run(calls)
-        self.time += duration
+        if self.impacts is not None:
+            self.impacts.note(self)
+
+    def continue_step(self) -> None:
+        """Let the next call go on with the step of the last one: `World.read_impacts` tells the impacts of both."""
+        if self.impacts is not None:
+            self.impacts.go_on(self)
+
+    def forget_impacts(self, chosen: np.ndarray | slice = slice(None)) -> None:
+        """Forget the impacts of some worlds, whose state is not that of their last step any more."""
+        if self.impacts is not None:
+            self.impacts.forget(self, chosen)
 
     def _make_with_fields(self, calls: list[Work]) -> None:
         """Tell fields the time, and make the calls; an exception of a field then names its class."""

@@ -34,7 +34,7 @@ def read_contacts(world: Batch, indices: np.ndarray, rows: int, body: int = EVER
         New arrays.
     """
     out = no_contacts(len(indices), rows)
-    if rows == 0 or not world.plan.contact:
+    if not world.plan.contact:
         return out
     strongest = Strongest(np.empty(rows, np.int64), np.empty(rows))
     world.plan.scheme.memory.read(world, np.ascontiguousarray(indices, np.int64), int(body), strongest, out)
@@ -54,8 +54,8 @@ def write_contact_forces(world: Batch, indices: np.ndarray, out: np.ndarray) -> 
         world.plan.scheme.memory.add_forces(world, indices, out)
 
 
-def write_contact_impulses(world: Batch, indices: np.ndarray, out: np.ndarray) -> None:
-    """Sums of the contact impulses on bodies, as `Contacts` tells them [N s], into `out` (n, bodies, 3)."""
-    write_contact_forces(world, indices, out)
+def write_contact_impulses(world: Batch, indices: np.ndarray, forces: np.ndarray, out: np.ndarray) -> None:
+    """Sums of the contact impulses on bodies [N s] into `out` (n, bodies, 3), from those of the forces."""
+    out[...] = forces
     if world.plan.contact:
         out *= world.plan.scheme.memory.durations(world, indices)

@@ -67,7 +67,8 @@ _MESSAGES = {
     ),
     Status.LEFT_OUT: (
         "more bodies were near each other than there is room for, and contacts were left out; spread the bodies, or "
-        "give the scene fewer"
+        "give the scene fewer. Where impacts are kept, some of them may have had no room; raise that of "
+        "World.keep_impacts"
     ),
     Status.OVERLAP: (
         "bodies were put where they overlap deeply, and are lifted apart without speed; put them further apart if that "
@@ -136,8 +137,8 @@ class StepReport:
         the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
         with more than the error tolerance); above the tolerance;
         impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
-        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room; bodies that moved in
-        fields which the step does not resolve.
+        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room, and events of a
+        world that keeps impacts (`World.keep_impacts`); bodies that moved in fields which the step does not resolve.
     overlap : (worlds,) float64
         Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
         hundredth of the smaller one's bounding radius; else 0.

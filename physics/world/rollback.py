@@ -18,6 +18,7 @@ def remember(world: Batch) -> Undo:
         for array, before in zip(world.kept(), arrays, strict=True):
             array[...] = before
         world.time = time
+        world.forget_impacts()
         if world.actuation is not None:
             world.actuation.reinstate(actuation)
         if world.recorder is not None:

@@ -135,6 +135,8 @@ class RolloutLoop:
         except Exception as error:
             _raise_again(error, world)
         world.time = float(times[-1])
+        if world.impacts is not None:
+            world.impacts.is_known = False  # the log holds the last step of each world, if any
         return times[1:]
 
 

@@ -224,6 +224,7 @@ def _adopt(world: Batch, chosen, rows, state, params, what, keep_memory=False) -
         world.sleep[rows] = 0.0
     if world.plan.contact and not keep_memory:
         world.memory.reshape(world.worlds, -1)[chosen] = 0.0
+        world.forget_impacts(chosen)
     if world.recorder is not None:
         world.recorder.changed(chosen)
 

@@ -108,6 +108,7 @@ class Stepper:
 
     def _prepare(self) -> None:
         calls = kernel_calls(self.world, self._wrench, self.steps, self.dt)
+        self.world.is_bound = True
         if self._then is not None:
             following = [self._then(taken) for taken in self.world.team.taken]
             if takes_each_step(self.world) and self.steps > 1:  # with calls of their own
@@ -129,11 +130,11 @@ def takes_each_step(world: Batch) -> bool:
 
 
 def _is_all(world: Batch, calls: list[Work]) -> bool:
-    """True if a step is this call: there is one thread, no actuator, and no field that is told the time.
+    """True if a step is this call: there is one thread, no actuator, and `Batch.make` has nothing to add.
 
     What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
     """
-    return len(calls) == 1 and world.actuation is None and not world.plan.fields
+    return len(calls) == 1 and world.actuation is None and world.is_plain
 
 
 def kernel_calls(

@@ -29,16 +29,15 @@ from physics.summary import counted
 from physics.undo import undo_on_error
 from physics.world import batch_arrays, parameters, restoring, rollback, setters
 from physics.world.actuator import Actuation
-from physics.world.batch import Batch
-from physics.world.contacts import contacts_of_world
 from physics.world.report import StepReport
 from physics.world.scene_settings import scene_settings
 from physics.world.snapshot import Snapshot
 from physics.world.stepper import kernel_calls, retime
+from physics.world.touching import Touching
 
 
 @known_keywords
-class World(Batch):
+class World(Touching):
     """Many worlds of one scene, stepped together and independent of each other.
 
     The same world gives the same bits whatever the batch size, its place in the batch and the number of threads.
@@ -92,7 +91,7 @@ class World(Batch):
         self.body_count = len(scene.bodies)
         self.names = body_names(scene)
         self.time = 0.0
-        self.recorder = None
+        self.recorder = self.impacts = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
         self._allocate()
         batch_arrays.fill(self)
@@ -112,7 +111,7 @@ class World(Batch):
         self.sleep = np.zeros((rows if self.plan.sleeping else 0, SLEEP_SIZE))
         self.report_table = np.zeros((self.worlds, at.REPORT_SIZE))
         self.event_counts = np.zeros(rows, dtype=np.int64)
-        self.make_event_room(0)
+        self._make_event_room(0)
         self.shapes = np.array([SHAPE_CODES[body.kind] for body in self.scene.bodies])
         actuator = self.scene.effect(Actuator)
         self.actuation = None if actuator is None else Actuation(actuator, (self.worlds, self.body_count, 6))
@@ -126,6 +125,7 @@ class World(Batch):
         self.team = Team(self.threads, self.worlds)
         register_terms(self.plan.terms)
         self._may_raise = self.plan.may_raise
+        self.is_plain, self.is_bound = not self.plan.fields and self.impacts is None, False
         self.scratch = [
             self.plan.scheme.make_scratch(self.scene, self.plan, self.walls, self.accuracy)
             for _ in range(self.team.size)
@@ -143,8 +143,11 @@ class World(Batch):
 
         Events go to `event_log` (worlds * bodies, room, EVENT_SIZE), with columns in
         `physics.kernels.time_stepping.event_log`. Their number goes to `event_counts` (worlds * bodies,) int64, and
-        includes events without room. Prepare a `Stepper` after this.
+        includes events without room. Prepare a `Stepper` after this. `keep_impacts` may have made more room.
         """
+        self._make_event_room(room if self.impacts is None else max(room, self.impacts.room))
+
+    def _make_event_room(self, room: int) -> None:
         self.event_log = np.zeros((len(self.event_counts), room, EVENT_SIZE))
         self._bound_for = None
 
@@ -384,32 +387,6 @@ class World(Batch):
     def _restore(self, snapshot: Snapshot, targets: restoring.Targets) -> None:
         restoring.reinstate(self, snapshot, targets)
 
-    def contacts(self, world: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Contact points and forces of one world's last step.
-
-        Returns
-        -------
-        points : (n, 3) float64
-            World frame [m].
-        forces : (n, 3) float64
-            On the body, of two bodies on the first one, world frame [N]. Time stepping averages them over the last
-            resting stage; the event-driven scheme has those at the end of the step. A stage is the whole step unless
-            something was met in it. Then forces times step, logged impulses and loads make up the change of momentum,
-            but for bodies that were pushed out of walls.
-        """
-        self._check_index(world)
-        found = contacts_of_world(self, world)
-        return found.point[0], found.force[0]
-
-    def contact_ends(self, world: int = 0) -> NDArray[np.int64]:
-        """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
-        self._check_index(world)
-        return contacts_of_world(self, world).ends[0]
-
-    def touching(self, world: int = 0) -> set[tuple[int, int]]:
-        """(body, wall) of every resting contact with a wall of one world at its last step."""
-        return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
-
     @property
     def asleep(self) -> NDArray[np.bool_]:
         """Sleeping bodies (worlds, bodies) bool, a new array; see `physics.Sleeping`."""
@@ -417,14 +394,11 @@ class World(Batch):
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
         return self.sleep[:, SLEEP_GROUP].reshape(self.worlds, self.body_count) > 0.0
 
-    def _check_index(self, world: int) -> None:
-        validation.index(world, self.worlds, "world")
-
     @exclusive
     def __getstate__(self):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
-        flags = ("is_torn", "telling")
+        flags = ("is_torn", "telling", "is_plain", "is_bound")
         for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *flags, *views):
             del kept[name]
         for name in ("is_free", "_user"):  # of `Exclusive`: a copy is free

@@ -28,7 +28,7 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
 
     Parameters
     ----------
-    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
+    render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `RigidEnv`.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
         Of the task, see `rigid_env.tasks.block.BlockTask`.
@@ -57,6 +57,7 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         accuracy: Preset | physics.Accuracy = "balanced",
         walls: Layout = "three",
         half_width: float = 10.0,
@@ -76,7 +77,7 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
             friction=friction, restitution=restitution, gravity=gravity, effects=effects, frame_skip=frame_skip, dt=dt,
             dump_faults=dump_faults,
         )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
 
     def _documented(self) -> type:
@@ -89,7 +90,8 @@ class BlockVectorEnv(RigidVectorEnv[NDArray[Any]]):
     Parameters
     ----------
     num_envs : int
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
+    autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
+    contacts, impacts
         As of `RigidVectorEnv`.
     threads : int
         Threads that share a step.
@@ -121,6 +123,7 @@ class BlockVectorEnv(RigidVectorEnv[NDArray[Any]]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         threads: int = 1,
         accuracy: Preset | physics.Accuracy = "balanced",
         walls: Layout = "three",
@@ -140,5 +143,5 @@ class BlockVectorEnv(RigidVectorEnv[NDArray[Any]]):
             half_width=half_width, mass=mass, size=size, friction=friction, restitution=restitution, gravity=gravity,
             effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
         )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)

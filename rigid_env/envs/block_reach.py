@@ -122,6 +122,7 @@ class BlockReachEnv(BlockEnv):
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
     | `contacts` | 0 | contacts told in `info`, those with the largest forces |
+    | `impacts` | 0 | pairs that collided told in `info`: the largest impulses |
     | `camera` | None | of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room |
     | `arrows` | True | whether pictures show contacts, forces and torques |
 

@@ -43,7 +43,7 @@ def check_task(
     contexts : tuple of str
         Ways to start workers that are tried; a class that stands in `__main__` without a file cannot be spawned.
     settings
-        Arguments of the task, and ``contacts`` of its environments.
+        Arguments of the task, ``contacts`` and ``impacts`` of its environments.
 
     Raises
     ------

@@ -1,60 +1,84 @@
-"""Contacts in infos, of single environments and of batches."""
+"""Contacts and impacts in infos, of single environments and of batches."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics import validation
-from physics.schemes.contacts import Contacts
-from physics.world.contacts import read_contacts
+from physics import Contacts, Impacts, validation
+from physics.world.touching import MOST_ROWS
 from rigid_env.tasks import Task
 
-KEYS = tuple(f"contact_{field}" for field in Contacts._fields)
-"""Keys of infos, in the order of the fields of `physics.schemes.contacts.Contacts`."""
+CONTACT_KEYS = tuple(f"contact_{field}" for field in Contacts._fields)
+"""Keys of infos for `physics.Contacts`, in the order of its fields."""
 
-MOST_ROWS = 65_536
+IMPACT_KEYS = tuple(f"impact_{field}" for field in Impacts._fields)
+"""Keys of infos for `physics.Impacts`, in the order of its fields."""
+
+
+class _Reader(NamedTuple):
+    """Reader of arrays with a row for each world, and their keys in infos."""
+
+    keys: tuple[str, ...]
+    read: Callable[..., tuple[np.ndarray, ...]]
+    rows: int
 
 
 class ContactInfos:
-    """Reader of a task's contacts for infos.
+    """Reader of a task's contacts and impacts for infos.
 
     Parameters
     ----------
     task : Task
-    rows : int
-        Contacts of each world that there is room for: those with the largest forces.
+    contacts, impacts : int
+        Rows of each world: contacts with the largest forces, pairs that collided with the largest impulses. 0: none.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Of all entries.
     """
 
-    def __init__(self, task: Task, rows: int):
-        self._task, self._rows, self._indices = task, rows, np.arange(task.worlds)
+    def __init__(self, task: Task, contacts: int, impacts: int):
+        world = task.world
+        self._readers = []
+        if contacts:
+            self._readers.append(_Reader(CONTACT_KEYS, world.read_contacts, contacts))
+        if impacts:
+            world.keep_impacts()
+            self._readers.append(_Reader(IMPACT_KEYS, world.read_impacts, impacts))
+        self.keys = tuple(key for reader in self._readers for key in reader.keys)
 
     def all(self) -> dict[str, np.ndarray]:
         """Entries of infos with a row for each world."""
-        return dict(zip(KEYS, read_contacts(self._task.world, self._indices, self._rows)))
+        return {
+            key: values
+            for reader in self._readers
+            for key, values in zip(reader.keys, reader.read(rows=reader.rows), strict=True)
+        }
 
     def one(self) -> dict[str, Any]:
         """Entries of the info of a batch of one world."""
-        count, *rows = read_contacts(self._task.world, self._indices, self._rows)
-        return dict(zip(KEYS, (count.item(), *(values[0] for values in rows))))
+        return {key: values[0].item() if values.ndim == 1 else values[0] for key, values in self.all().items()}
 
 
-def contact_infos(task: Task, contacts: int) -> ContactInfos | None:
-    """Make the reader for the environment's argument `contacts`; None where it is 0.
+def contact_infos(task: Task, contacts: int, impacts: int) -> ContactInfos | None:
+    """Make the reader for the environment's arguments `contacts` and `impacts`; None where both are 0.
 
     Raises
     ------
     ValueError
-        It is no count, or the task has an info of the same key.
+        One of them is no count, or the task has an info of the same key.
     """
-    rows = validation.count(contacts, "contacts", least=0, most=MOST_ROWS)
-    if rows == 0:
-        return None
-    for name in (*task.info_names, *task.own_draws):
-        if name in KEYS:
+    given = {"contacts": contacts, "impacts": impacts}
+    rows = {name: validation.count(value, name, least=0, most=MOST_ROWS) for name, value in given.items()}
+    for name, keys in (("contacts", CONTACT_KEYS), ("impacts", IMPACT_KEYS)):
+        same = [key for key in (*task.info_names, *task.own_draws) if key in keys]
+        if rows[name] and same:
             raise ValueError(
-                f"contacts is {rows}, but {type(task).__name__} has {name!r} in its info; allowed are 0, and tasks "
-                f"without {', '.join(KEYS)}"
+                f"{name} is {rows[name]}, but {type(task).__name__} has {same[0]!r} in its info; allowed are 0, and "
+                f"tasks without {', '.join(keys)}"
             )
-    return ContactInfos(task, rows)
+    return ContactInfos(task, **rows) if any(rows.values()) else None

@@ -45,7 +45,10 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         Height and width [px].
     obs_stack : int
     contacts : int
-        Contacts that every info tells, those with the largest forces; see `rigid_env.envs.contact_infos`. 0: none.
+        Contacts that every info tells, those with the largest forces; see `physics.Contacts`. 0: none.
+    impacts : int
+        Pairs that collided in the control step that every info tells, those with the largest impulses; see
+        `physics.Impacts`. 0: none, and impacts are not kept.
     camera : Camera, mapping or None
         Of pictures that `render` makes: a `rigid_env.rendering.Camera`, or a mapping of its parameters. None has the
         whole room in sight. Observations keep their own view.
@@ -70,6 +73,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
@@ -85,7 +89,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         self._world = np.zeros(1, dtype=np.int64)
         self._is_plain = type(self._source) is StateSource
         self._action_shape = self.action_space.shape
-        self._info = info_maker(task, contacts)
+        self._info = info_maker(task, contacts, impacts)
         self._ends_on_success = task.ends_on_success
         self._has_reset = self._is_closed = False
 

@@ -39,7 +39,7 @@ class InfoMaker:
 
 
 class ContactInfoMaker:
-    """Maker of an info dict that also holds the contacts of the world.
+    """Maker of an info dict that also holds contacts or impacts of the world.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class ContactInfoMaker:
         return {**self._plain(row, status), **self._contacts.one()}
 
 
-def info_maker(task: Task, contacts: int) -> InfoMaker | ContactInfoMaker:
-    """Maker of the infos of a task of one world; `contacts` as in `rigid_env.envs.contact_infos.contact_infos`."""
-    plain, reader = InfoMaker(task.info_names), contact_infos(task, contacts)
+def info_maker(task: Task, contacts: int, impacts: int) -> InfoMaker | ContactInfoMaker:
+    """Maker of the infos of a task of one world; other arguments as of `contact_infos.contact_infos`."""
+    plain, reader = InfoMaker(task.info_names), contact_infos(task, contacts, impacts)
     return plain if reader is None else ContactInfoMaker(plain, reader)

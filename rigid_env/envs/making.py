@@ -11,7 +11,9 @@ from typing import Any
 from physics.keywords import nearest_first
 from rigid_env.tasks import Task
 
-OF_ENVIRONMENT = ["render_mode", "width", "height", "camera", "arrows", "obs", "obs_size", "obs_stack", "contacts"]
+OF_ENVIRONMENT = [
+    "render_mode", "width", "height", "camera", "arrows", "obs", "obs_size", "obs_stack", "contacts", "impacts",
+]  # fmt: skip
 """Names of settings that belong to an environment, not to its task."""
 
 

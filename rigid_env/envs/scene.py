@@ -140,6 +140,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | `obs_size` | (84, 84) | height and width of these [px] |
     | `obs_stack` | 1 | of the last so many control steps, along the last axis, the newest last |
     | `contacts` | 0 | contacts told in `info`, those with the largest forces |
+    | `impacts` | 0 | pairs that collided told in `info`: the largest impulses |
     | `camera` | None | of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room |
     | `arrows` | True | whether pictures show contacts, forces and torques |
 
@@ -164,6 +165,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
@@ -184,7 +186,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
             frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
             dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(task, *told, camera=camera, arrows=arrows)
 
     def _documented(self) -> type:
@@ -207,7 +209,8 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
     ----------
     num_envs : int
     scene : physics.Scene, str or Path
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
+    autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
+    contacts, impacts
         As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.
     driven, force, torque, frame, length, goal, start, frame_skip, dt, episode_steps, accuracy, effects, dump_faults
         As of `SceneEnv`.
@@ -238,6 +241,7 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         driven: Driven | None = None,
         force: float | None = None,
         torque: float | None = None,
@@ -259,7 +263,7 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
             accuracy=accuracy, effects=effects, dump_faults=dump_faults, threads=threads,
         )  # fmt: skip
         check_limit(max_episode_steps, task.max_episode_steps)
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
 
     def _one_limit(self, values: Any) -> int | None:

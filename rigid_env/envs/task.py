@@ -25,7 +25,7 @@ class TaskEnv(RigidEnv[Any]):
     ----------
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
+    render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `RigidEnv`.
     settings
         Arguments of the task.
@@ -51,9 +51,10 @@ class TaskEnv(RigidEnv[Any]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         **settings: Any,
     ) -> None:
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(make_task(task, 1, settings), *told, camera=camera, arrows=arrows)
 
 
@@ -65,7 +66,8 @@ class TaskVectorEnv(RigidVectorEnv[Any]):
     num_envs : int
     task : class of Task, or str
         The class, or where it stands: ``module:Class``.
-    autoreset_mode, max_episode_steps, render_mode, width, height, obs, obs_size, obs_stack, contacts, camera, arrows
+    autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
+    contacts, impacts
         As of `RigidVectorEnv`.
     settings
         Arguments of the task, ``threads`` among them.
@@ -94,8 +96,9 @@ class TaskVectorEnv(RigidVectorEnv[Any]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         **settings: Any,
     ) -> None:
         batch = make_task(task, validation.count(num_envs, "num_envs"), settings)
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts
+        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
         super().__init__(batch, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)

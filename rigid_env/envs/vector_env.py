@@ -49,7 +49,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         ``human`` shows world 0.
     width, height : int
         Of one world's picture [px].
-    obs, obs_size, obs_stack, contacts, camera, arrows
+    obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `rigid_env.envs.env.RigidEnv`.
 
     Raises
@@ -73,13 +73,14 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         obs_size: Sequence[int] = (84, 84),
         obs_stack: int = 1,
         contacts: int = 0,
+        impacts: int = 0,
         *,
         camera: CameraArgument = None,
         arrows: bool = True,
     ) -> None:
         self.task = task
         self._source: Any = make_source(task, obs, obs_size, obs_stack)
-        self.contact_infos = contact_infos(task, contacts)
+        self.contact_infos = contact_infos(task, contacts, impacts)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)

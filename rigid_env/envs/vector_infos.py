@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from rigid_env.envs.contact_infos import KEYS, ContactInfos
+from rigid_env.envs.contact_infos import ContactInfos
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 
 
 def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
     """Keys of every info, of a step and of a start."""
-    return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else KEYS))
+    return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else contacts.keys))
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:

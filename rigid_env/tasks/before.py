@@ -46,6 +46,7 @@ class Before:
         for array, kept in self._kept:
             array[...] = kept
         task.world.time, task.clock = self._time, self._clock
+        task.world.forget_impacts()
         if self._actuation is not None:
             task.world.actuation.reinstate(self._actuation)
         for world, state in self._generators.items():

@@ -43,6 +43,7 @@ OF_ENVIRONMENTS = {
     "obs_size": "height and width of these [px]",
     "obs_stack": "of the last so many control steps, along the last axis, the newest last",
     "contacts": "contacts told in `info`, those with the largest forces",
+    "impacts": "pairs that collided told in `info`: the largest impulses",
     "camera": "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room",
     "arrows": "whether pictures show contacts, forces and torques",
 }

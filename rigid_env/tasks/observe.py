@@ -15,6 +15,7 @@ from rigid_env.tasks.entries import Entry
 AXES = "xyz"
 LENGTH, SPEED, SPIN, REACH = 5.0, 5.0, 5.0, 10.0  # [m], [m/s], [rad/s], and how many units an entry may hold
 IMPULSE = 0.01  # [m g s]: a weight over two of the default physics steps
+IMPACT = 0.1  # [m g s]: a plastic collision at 1 m/s
 MOST_CONTACTS = 1024
 
 
@@ -80,12 +81,19 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
 
 
 def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
-    """Sum of the contact impulses on a body over its weight, in the last resting stage; collisions are left out.
+    """Sum of the contact impulses on a body over its weight, in the last resting stage.
 
-    A stage is what the last physics step ends with: see `physics.schemes.contacts.Contacts`.
+    A stage is what the last physics step ends with: see `physics.Contacts`. Those of impacts: `impact_impulse`.
     """
     names = _names("contact impulse", body)
     read = lambda worlds: worlds.contact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731
+    return Entry(names, "m g s", -bound, bound, read, scale)
+
+
+def impact_impulse(body: int = 0, scale: float = IMPACT, bound: float = REACH) -> Entry:
+    """Sum of the impulses of impacts on a body over its weight, in the whole control step."""
+    names = _names("impact impulse", body)
+    read = lambda worlds: worlds.impact_impulse[:, body] / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g s", -bound, bound, read, scale)
 
 
@@ -102,10 +110,17 @@ def contact_forces(body: int = 0, count: int = 4, bound: float = REACH) -> Entry
     return Entry(names, "m g", -bound, bound, read)
 
 
-def _contact_names(what: str, body: int, count: int) -> tuple[str, ...]:
+def impact_impulses(body: int = 0, count: int = 2, scale: float = IMPACT, bound: float = REACH) -> Entry:
+    """Impulses of a body's impacts over its weight: of each wall or body that it hit, the `count` largest."""
+    names = _contact_names("impulse", body, count, "impact")
+    read = lambda worlds: _rows(worlds.impacts_of(body, count).impulse) / worlds.weight[:, body, None]  # noqa: E731
+    return Entry(names, "m g s", -bound, bound, read, scale)
+
+
+def _contact_names(what: str, body: int, count: int, of: str = "contact") -> tuple[str, ...]:
     check_body(body)
     validation.count(count, "count", most=MOST_CONTACTS)
-    head = "contact" if body == 0 else f"contact of body {body}"
+    head = of if body == 0 else f"{of} of body {body}"
     return tuple(f"{head}: {what} {k} {axis}" for k in range(count) for axis in AXES)
 
 

@@ -64,6 +64,7 @@ class Steps:
             if self._first is not None:
                 self._run(self._first, first, both)
                 gravest(self._world.report_table, self._early)
+                self._world.continue_step()
                 self._run(self._last, command, load)
             else:
                 self._run(self._last, first, both)

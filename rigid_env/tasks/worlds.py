@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.schemes.contacts import Contacts
-from physics.world.contacts import contact_rows, read_contacts, write_contact_forces, write_contact_impulses
+from physics import Contacts, Impacts
 from rigid_env.tasks.named import Named
 from rigid_env.tasks.reading import write_rotations, write_wall_gaps
 from rigid_env.tasks.task_parts import Watched
@@ -49,6 +48,7 @@ class Worlds:
         self._task, world = task, task.world
         self.is_all = indices is None
         self.indices: Any = np.arange(task.worlds) if indices is None else indices
+        self._read = indices
         take = (lambda array: array) if self.is_all else (lambda array: array[indices])
         moving = world.pos, world.quat, world.linvel, world.angvel
         self.pos, self.quat, self.linvel, self.angvel = (read_only(take(array)) for array in moving)
@@ -65,6 +65,8 @@ class Worlds:
         self.measured: Mapping[str, np.ndarray] = {}
         self._found: dict[str, np.ndarray] = {}
         self._contacts: dict[tuple[int, ...], Contacts] = {}
+        self._impacts: dict[tuple[int, ...], Impacts] = {}
+        self._sums: tuple[np.ndarray, np.ndarray] | None = None
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -93,17 +95,22 @@ class Worlds:
     @property
     def contact_force(self) -> np.ndarray:
         """(n, bodies, 3) float64. Sum of the contact forces on each body in the last physics step, world frame [N]."""
-        return self._worked_out("contact_force", write_contact_forces, (self._task.world.body_count, 3))
+        return self._contact_sums()[0]
 
     @property
     def contact_impulse(self) -> np.ndarray:
         """(n, bodies, 3) float64. Sum of the contact impulses of the last resting stage, world frame [N s]."""
-        return self._worked_out("contact_impulse", write_contact_impulses, (self._task.world.body_count, 3))
+        return self._contact_sums()[1]
+
+    def _contact_sums(self) -> tuple[np.ndarray, np.ndarray]:
+        if self._sums is None:
+            self._sums = self._task.world.read_contact_sums(self._read)
+        return self._sums
 
     @property
     def contacts(self) -> Contacts:
-        """Contacts of the last physics step, at most 12 rows for each body; see `physics.schemes.contacts.Contacts`."""
-        return self._contacts_of(contact_rows(self._task.world))
+        """Contacts of the last physics step, at most 12 rows for each body; see `physics.Contacts`."""
+        return self._contacts_of()
 
     def contacts_of(self, body: int, count: int) -> Contacts:
         """Contacts of one body, always as the first body: the `count` with the largest forces."""
@@ -111,8 +118,30 @@ class Worlds:
 
     def _contacts_of(self, *chosen: int) -> Contacts:
         if chosen not in self._contacts:
-            self._contacts[chosen] = read_contacts(self._task.world, self.indices, *chosen)
+            self._contacts[chosen] = self._task.world.read_contacts(self._read, *chosen)
         return self._contacts[chosen]
+
+    @property
+    def impact_impulse(self) -> np.ndarray:
+        """(n, bodies, 3) float64. Sum of the impulses of impacts on each body in the control step [N s]."""
+        return self._impacts_of(0).total
+
+    @property
+    def impacts(self) -> Impacts:
+        """Impacts of the last control step, a row for each pair; see `physics.Impacts`."""
+        return self._impacts_of()
+
+    def impacts_of(self, body: int, count: int) -> Impacts:
+        """Impacts of one body, always as the first body: the `count` pairs with the largest impulses."""
+        return self._impacts_of(count, body)
+
+    def _impacts_of(self, *chosen: int) -> Impacts:
+        if chosen not in self._impacts:
+            world = self._task.world
+            if world.impacts is None:
+                world.keep_impacts()  # at the rehearsal, before the first step
+            self._impacts[chosen] = world.read_impacts(self._read, *chosen)
+        return self._impacts[chosen]
 
     @property
     def wrench(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 
 from rigid_env import BlockReachEnv, BlockReachVectorEnv, SceneEnv, SceneVectorEnv, TaskEnv, TaskVectorEnv
 from rigid_env.envs.checks import check_task
-from rigid_env.envs.contact_infos import KEYS
+from rigid_env.envs.contact_infos import CONTACT_KEYS as KEYS
 from rigid_env.envs.infos import InfoMaker
 from rigid_env.tasks import BlockReach
 from tests.envs.conftest import random_actions

@@ -130,6 +130,8 @@ CASES = [
     Case("contacts-half", lambda: BlockReachVectorEnv(2, contacts=1.5), ("contacts", "1.5", "at least 0")),
     Case("contacts-text", lambda: BlockReachEnv(contacts="a"), ("contacts", "'a'", "at least 0")),
     Case("contacts-many", lambda: BlockReachEnv(contacts=10**9), ("contacts", "1000000000", "0 to 65536")),
+    Case("impacts-negative", lambda: BlockReachEnv(impacts=-1), ("impacts", "-1", "at least 0")),
+    Case("impacts-text", lambda: BlockReachVectorEnv(2, impacts="a"), ("impacts", "'a'", "at least 0")),
     # --- stepped ------------------------------------------------------------------------------------------
     Case("step-first", lambda env: env.step(STILL), ("reset()", "step()"), "new-env", NOT_READY),
     Case("step-first-batch", lambda envs: envs.step(np.zeros((2, 6))), ("reset()", "step()"), "new-batch", NOT_READY),
