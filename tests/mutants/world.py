@@ -43,6 +43,22 @@ WORLD = [
         "if table[world, at.FAULTS] > 1.0:",
         "test_stepper.py::test_the_status_is_the_gravest_thing_whatever_else_is_in_the_batch",
     ),
+    _mutant(
+        "world-impacts-other",
+        "The other body of an impact gets the same impulse as the first one.",
+        "world/impacts.py",
+        "out.total[n, b, c] -=",
+        "out.total[n, b, c] +=",
+        "test_impacts.py::test_two_balls_get_opposite_impulses",
+    ),
+    _mutant(
+        "world-impacts-joined",
+        "Impacts of the earlier calls of a step are dropped.",
+        "world/impacts.py",
+        "if not self._goes_on:",
+        "if True:",
+        "test_impacts.py::test_a_call_of_many_steps_has_the_collisions_of_all",
+    ),
     Mutant(
         "world-gusts",
         "Gusts that begin later have the wrong sign of their delay.",
