@@ -22,7 +22,8 @@ from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
-from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.restoring import put, take
+from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import shaped
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms

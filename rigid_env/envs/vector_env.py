@@ -27,7 +27,8 @@ from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.state import TaskState, put, remember, take
+from rigid_env.tasks.restoring import put, remember, take
+from rigid_env.tasks.state import TaskState
 
 Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminations, truncations and infos of one control step."""

@@ -15,7 +15,8 @@ from rigid_env.tasks.actions import Wrench
 from rigid_env.tasks.area import Area
 from rigid_env.tasks.arguments import BatchArguments, ControlArguments, part, takes
 from rigid_env.tasks.block_draws import YAW, EdgesInside, Face, OnFloor
-from rigid_env.tasks.distributions import LAST, Distribution, Uniform
+from rigid_env.tasks.distribution import LAST, Distribution
+from rigid_env.tasks.distributions import Uniform
 from rigid_env.tasks.kernels import start_poses
 from rigid_env.tasks.parameters import LENGTHS, Edges, Number, middle, parse_range, scene_size
 from rigid_env.tasks.task import Task

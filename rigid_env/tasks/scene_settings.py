@@ -16,7 +16,8 @@ from physics.scene.body_names import body_index, told_bodies
 from physics.summary import shown
 from rigid_env.tasks.actions import FRAMES
 from rigid_env.tasks.arguments import ControlArguments, part
-from rigid_env.tasks.distributions import Uniform, read_numbers
+from rigid_env.tasks.distribution import read_numbers
+from rigid_env.tasks.distributions import Uniform
 from rigid_env.tasks.observe import LENGTH, REACH
 from rigid_env.tasks.scene_section import Section, body_indices
 

@@ -23,7 +23,7 @@ from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
-from rigid_env.tasks.distributions import Distribution
+from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
 from rigid_env.tasks.entries import Observation
