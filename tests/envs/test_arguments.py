@@ -23,7 +23,7 @@ MANY = ("autoreset_mode", "max_episode_steps", *ONE)
 
 @dataclass(frozen=True)
 class Place:
-    """Where a lamp stands."""
+    """Place of a lamp."""
 
     room: str
     floor: int = 0
@@ -31,7 +31,7 @@ class Place:
 
 @dataclass(frozen=True, kw_only=True)
 class Light:
-    """What a lamp gives."""
+    """Light of a lamp."""
 
     power: float = 60.0
 
