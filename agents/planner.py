@@ -31,8 +31,9 @@ from rigid_env.cli.files import output_option
 from rigid_env.cli.names import checked_preset
 from rigid_env.envs.making import make_task
 from rigid_env.envs.named import make_named
+from rigid_env.tasks.restoring import put
 from rigid_env.tasks.rollout import rollout
-from rigid_env.tasks.state import TaskState, put
+from rigid_env.tasks.state import TaskState
 from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
 
 ENV_ID = "rigid_env:rigid_env/BlockReach-v0"

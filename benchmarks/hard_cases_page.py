@@ -31,8 +31,8 @@ derived in the docstring of the case (`rigid_env/hard_cases/cases`), with its so
 order of the scheme leaves (C dt²), or the tolerance that the preset solves contact problems to.
 
 *Margin* is the share of the tightest limit that is left: 100 % nothing used, 0 % just holds. What an accuracy cannot
-express says so; what is not built is listed; what fails stays, with the reason. The same cases are the tests in
-`tests/hard_cases`, where a case that fails is expected to, and fails the test when it does not any more.
+express says so; what fails stays, with the reason. The same cases are the tests in `tests/hard_cases`, where a case
+that fails is expected to, and fails the test when it does not any more.
 
 ```sh
 rigid-env hard-cases                                # all, at the default accuracy and 10 ms

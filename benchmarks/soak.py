@@ -20,7 +20,7 @@ from rich.progress import Progress
 import physics
 from benchmarks import machine, soak_env
 from benchmarks.shrink import shrink
-from rigid_env.hard_cases.cases import random_scenes
+from rigid_env.hard_cases.cases import random_draws, random_scenes
 from rigid_env.lab.measure.machine import write_json
 
 BATCH = 200
@@ -32,8 +32,8 @@ def soak_scenes(seconds: float, seed: int, accuracy: str, keep: Path | None, tic
     """Random scenes for so many seconds: what was run, and what was found."""
     rng, found = np.random.default_rng(seed), {}
     worlds = {
-        family: physics.World(random_scenes.scene_of(family), worlds=BATCH, accuracy=accuracy)
-        for family in random_scenes.BODIES
+        family: physics.World(random_draws.scene_of(family), worlds=BATCH, accuracy=accuracy)
+        for family in random_draws.BODIES
     }
     for family, world in worlds.items():
         world.step(dt=1e-9)  # compiles

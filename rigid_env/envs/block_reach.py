@@ -102,7 +102,6 @@ class BlockReachEnv(BlockEnv):
 
     | Argument | Default | Meaning |
     | --- | --- | --- |
-    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
     | `walls` | `"three"` | layout: `"three"` or `"corner"` |
     | `half_width` | 10.0 | half the width of the floor [m] |
     | `mass` | 6.0 | of the block [kg] |
@@ -110,11 +109,12 @@ class BlockReachEnv(BlockEnv):
     | `friction` | 0.5 | Coulomb coefficient against the walls |
     | `restitution` | 0.2 | of the block against the walls |
     | `gravity` | 9.81 | along -y [m/s²] |
+    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
     | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
-    | `frame_skip` | 5 | physics steps per control step |
-    | `dt` | 0.005 | physics step [s] |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |
+    | `frame_skip` | 5 | physics steps per control step |
+    | `dt` | 0.005 | physics step [s] |
     | `render_mode` | None | `"rgb_array"`, `"human"` or None |
     | `width` | 960 | of pictures [px] |
     | `height` | 600 | of pictures [px] |

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -12,20 +12,26 @@ from numpy.typing import ArrayLike, NDArray
 
 from physics.parallel.exclusive import Exclusive, exclusive, in_use
 from physics.undo import Undo, undo_on_error
+from rigid_env.envs.arguments import CommonArguments, TaskArgument
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
-from rigid_env.envs.sources import Obs, ObsKind, StateSource, make_source
+from rigid_env.envs.sources import Obs, StateSource, make_source
 from rigid_env.envs.spaces import action_space
-from rigid_env.rendering.camera_argument import CameraArgument
-from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
-from rigid_env.tasks import Task
+from rigid_env.rendering.view import RENDER_MODES, View
+from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
-from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.restoring import put, take
+from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import shaped
 
 RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
+
+
+@dataclass(frozen=True)
+class _Arguments(CommonArguments, TaskArgument):
+    pass
 
 
 class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
@@ -63,33 +69,21 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}  # noqa: RUF012
 
-    def __init__(
-        self,
-        task: Task,
-        render_mode: RenderMode | None = None,
-        width: int = 960,
-        height: int = 600,
-        obs: ObsKind = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        impacts: int = 0,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-    ) -> None:
-        self.task = task
-        self._source: Any = make_source(task, obs, obs_size, obs_stack)
+    @takes(_Arguments)
+    def __init__(self, given: _Arguments) -> None:
+        self.task = task = given.task
+        self._source: Any = make_source(task, given)
         lend_goals(task, self)
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / self.task.control_dt))}
-        self.render_mode = render_mode
+        fps = max(1, round(1.0 / task.control_dt))
+        self.metadata = {**self.metadata, "render_fps": fps}
+        self.render_mode = given.render_mode
         self.observation_space = self._source.space
         self.action_space = action_space(task)
-        self._view = View(render_mode, width, height, self.metadata["render_fps"], type(task).__name__, camera, arrows)
+        self._view = View(given, fps, type(task).__name__)
         self._world = np.zeros(1, dtype=np.int64)
         self._is_plain = type(self._source) is StateSource
         self._action_shape = self.action_space.shape
-        self._info = info_maker(task, contacts, impacts)
+        self._info = info_maker(task, given.contacts, given.impacts)
         self._ends_on_success = task.ends_on_success
         self._has_reset = self._is_closed = False
 
@@ -245,8 +239,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         """Sections of `describe`; includes the defaults of the environment's id, if it was made from one."""
         registered = None if self.spec is None else gym.registry.get(self.spec.id)
         documented = self._documented()
-        own = list(inspect.signature(RigidEnv.__init__).parameters.values())[2:]  # without self and task
-        added = {parameter.name: parameter.default for parameter in own}
+        added = {name: each.default for name, each in inspect.signature(CommonArguments).parameters.items()}
         return sections(self.task, documented, added, None if registered is None else registered.kwargs)
 
     def _documented(self) -> type:

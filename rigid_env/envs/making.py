@@ -5,15 +5,15 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Mapping
+from dataclasses import fields
 from importlib import import_module
 from typing import Any
 
 from physics.keywords import nearest_first
+from rigid_env.envs.arguments import CommonArguments
 from rigid_env.tasks import Task
 
-OF_ENVIRONMENT = [
-    "render_mode", "width", "height", "camera", "arrows", "obs", "obs_size", "obs_stack", "contacts", "impacts",
-]  # fmt: skip
+OF_ENVIRONMENT = [each.name for each in fields(CommonArguments)]
 """Names of settings that belong to an environment, not to its task."""
 
 

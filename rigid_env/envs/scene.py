@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
-from gymnasium.vector import AutoresetMode
 from numpy.typing import ArrayLike, NDArray
 
-import physics
 from physics import validation
-from physics.annotations import Effect, Frame, Preset
 from physics.keywords import known_keywords
+from rigid_env.envs.arguments import CommonArguments, CountArgument, VectorArguments
 from rigid_env.envs.env import RigidEnv
-from rigid_env.envs.sources import ObsKind
-from rigid_env.envs.vector_arguments import Autoreset, episode_limit
+from rigid_env.envs.vector_arguments import episode_limit
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.rendering.camera_argument import CameraArgument
-from rigid_env.rendering.view import RenderMode
-from rigid_env.tasks.scene_task import SceneTask
+from rigid_env.tasks.arguments import EngineArguments, part, takes
+from rigid_env.tasks.scene_settings import SceneArguments
+from rigid_env.tasks.scene_task import SceneArgument, SceneTask
 
-SceneSource = physics.Scene | str | os.PathLike
-Driven = str | int | Sequence[str | int]
+
+@dataclass(frozen=True)
+class _SingleArguments(EngineArguments, SceneArguments, CommonArguments, SceneArgument):
+    pass
+
+
+@dataclass(frozen=True)
+class _BatchArguments(EngineArguments, SceneArguments, VectorArguments, SceneArgument, CountArgument):
+    pass
 
 
 @known_keywords
@@ -152,42 +154,10 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     - v0: first version.
     """
 
-    def __init__(
-        self,
-        scene: SceneSource | None = None,
-        render_mode: RenderMode | None = None,
-        width: int = 960,
-        height: int = 600,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: ObsKind = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        impacts: int = 0,
-        driven: Driven | None = None,
-        force: float | None = None,
-        torque: float | None = None,
-        frame: Frame | None = None,
-        length: float | None = None,
-        goal: Mapping[str, Any] | None = None,
-        start: Mapping[str, Any] | None = None,
-        frame_skip: int | None = None,
-        dt: float | None = None,
-        episode_steps: int | None = None,
-        accuracy: Preset | physics.Accuracy = "balanced",
-        effects: Iterable[Effect] = (),
-        dump_faults: str | Path | None = None,
-        threads: int = 1,
-    ) -> None:
-        task = SceneTask(
-            1, scene, driven=driven, force=force, torque=torque, frame=frame, length=length, goal=goal, start=start,
-            frame_skip=frame_skip, dt=dt, episode_steps=episode_steps, accuracy=accuracy, effects=effects,
-            dump_faults=dump_faults, threads=threads,
-        )  # fmt: skip
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
-        super().__init__(task, *told, camera=camera, arrows=arrows)
+    @takes(_SingleArguments)
+    def __init__(self, given: _SingleArguments) -> None:
+        task = SceneTask(1, given.scene, **part(given, SceneArguments, EngineArguments))
+        super().__init__(task, **part(given, CommonArguments))
 
     def _documented(self) -> type:
         return type(self)
@@ -225,46 +195,12 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
         Naming file, line and key or the argument, the value, and what is allowed.
     """
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        scene: SceneSource | None = None,
-        autoreset_mode: AutoresetMode | Autoreset = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | Literal["registered"] | None = "registered",
-        render_mode: RenderMode | None = None,
-        width: int = 960,
-        height: int = 600,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-        obs: ObsKind = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        impacts: int = 0,
-        driven: Driven | None = None,
-        force: float | None = None,
-        torque: float | None = None,
-        frame: Frame | None = None,
-        length: float | None = None,
-        goal: Mapping[str, Any] | None = None,
-        start: Mapping[str, Any] | None = None,
-        frame_skip: int | None = None,
-        dt: float | None = None,
-        episode_steps: int | None = None,
-        accuracy: Preset | physics.Accuracy = "balanced",
-        effects: Iterable[Effect] = (),
-        dump_faults: str | Path | None = None,
-        threads: int = 1,
-    ) -> None:
-        task = SceneTask(
-            validation.count(num_envs, "num_envs"), scene, driven=driven, force=force, torque=torque, frame=frame,
-            length=length, goal=goal, start=start, frame_skip=frame_skip, dt=dt, episode_steps=episode_steps,
-            accuracy=accuracy, effects=effects, dump_faults=dump_faults, threads=threads,
-        )  # fmt: skip
-        check_limit(max_episode_steps, task.max_episode_steps)
-        told = render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts
-        super().__init__(task, autoreset_mode, max_episode_steps, *told, camera=camera, arrows=arrows)
+    @takes(_BatchArguments)
+    def __init__(self, given: _BatchArguments) -> None:
+        worlds = validation.count(given.num_envs, "num_envs")
+        task = SceneTask(worlds, given.scene, **part(given, SceneArguments, EngineArguments))
+        check_limit(given.max_episode_steps, task.max_episode_steps)
+        super().__init__(task, **part(given, VectorArguments))
 
     def _one_limit(self, values: Any) -> int | None:
         limit = super()._one_limit(values)

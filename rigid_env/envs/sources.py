@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -22,6 +23,17 @@ ObsKind = Literal["state", "pixels"]
 
 Obs = TypeVar("Obs")
 """Type of an observation: an array, or a dictionary of arrays where a task has goals."""
+
+
+@dataclass(frozen=True)
+class ObservationArguments:
+    """Arguments about what an environment tells; see `rigid_env.envs.env.RigidEnv`."""
+
+    obs: ObsKind = "state"
+    obs_size: Sequence[int] = (84, 84)
+    obs_stack: int = 1
+    contacts: int = 0
+    impacts: int = 0
 
 
 class StateSource:
@@ -127,7 +139,7 @@ class PixelSource:
         return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
 
 
-def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> Any:
+def make_source(task: Task, given: ObservationArguments) -> Any:
     """Make the source of observations for an environment's arguments.
 
     Raises
@@ -135,6 +147,6 @@ def make_source(task: Task, obs: str, size: Sequence[int], stack: int) -> Any:
     ValueError
         Naming the argument, its value and what is allowed.
     """
-    validation.one_of(obs, KINDS, "obs")
-    source: Any = StateSource(task) if obs == "state" else PixelSource(task, size, stack)
+    validation.one_of(given.obs, KINDS, "obs")
+    source: Any = StateSource(task) if given.obs == "state" else PixelSource(task, given.obs_size, given.obs_stack)
     return GoalSource(task, source) if isinstance(task, GoalTask) else source

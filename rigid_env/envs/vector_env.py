@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -15,21 +16,27 @@ from physics.parallel.exclusive import Exclusive, exclusive
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs import vector_arguments as arguments
 from rigid_env.envs import vector_infos
+from rigid_env.envs.arguments import TaskArgument, VectorArguments
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
-from rigid_env.envs.sources import Obs, ObsKind, make_source
+from rigid_env.envs.sources import Obs, make_source
 from rigid_env.envs.spaces import action_space
-from rigid_env.envs.vector_arguments import Autoreset
-from rigid_env.rendering.camera_argument import CameraArgument
-from rigid_env.rendering.view import RENDER_MODES, RenderMode, View
+from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
+from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.state import TaskState, put, remember, take
+from rigid_env.tasks.restoring import put, remember, take
+from rigid_env.tasks.state import TaskState
 
 Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
 """Observations, rewards, terminations, truncations and infos of one control step."""
+
+
+@dataclass(frozen=True)
+class _Arguments(VectorArguments, TaskArgument):
+    pass
 
 
 class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
@@ -61,43 +68,25 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     task: Task
     _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
 
-    def __init__(
-        self,
-        task: Task,
-        autoreset_mode: AutoresetMode | Autoreset = AutoresetMode.NEXT_STEP,
-        max_episode_steps: int | Literal["registered"] | None = "registered",
-        render_mode: RenderMode | None = None,
-        width: int = 960,
-        height: int = 600,
-        obs: ObsKind = "state",
-        obs_size: Sequence[int] = (84, 84),
-        obs_stack: int = 1,
-        contacts: int = 0,
-        impacts: int = 0,
-        *,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-    ) -> None:
-        self.task = task
-        self._source: Any = make_source(task, obs, obs_size, obs_stack)
-        self.contact_infos = contact_infos(task, contacts, impacts)
+    @takes(_Arguments)
+    def __init__(self, given: _Arguments) -> None:
+        self.task = task = given.task
+        self._source: Any = make_source(task, given)
+        self.contact_infos = contact_infos(task, given.contacts, given.impacts)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
-        self.autoreset_mode = arguments.autoreset_mode(autoreset_mode)
-        is_registered = isinstance(max_episode_steps, str) and max_episode_steps == "registered"
-        self.max_episode_steps = arguments.episode_limit(task.max_episode_steps if is_registered else max_episode_steps)
-        fps = max(1, round(1.0 / self.task.control_dt))
-        self.metadata = {
-            "render_modes": list(RENDER_MODES),
-            "render_fps": fps,
-            "autoreset_mode": self.autoreset_mode,
-        }
-        self.render_mode = render_mode
+        self.autoreset_mode = arguments.autoreset_mode(given.autoreset_mode)
+        limit: Any = given.max_episode_steps
+        is_registered = isinstance(limit, str) and limit == "registered"
+        self.max_episode_steps = arguments.episode_limit(task.max_episode_steps if is_registered else limit)
+        fps = max(1, round(1.0 / task.control_dt))
+        self.metadata = {"render_modes": list(RENDER_MODES), "render_fps": fps, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = given.render_mode
         self.single_observation_space = self._source.space
         self.single_action_space = action_space(task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._view = View(render_mode, width, height, fps, type(task).__name__, camera, arrows)
+        self._view = View(given, fps, type(task).__name__)
         self._seeds = [-1] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._waiting = np.ones(num_envs, dtype=np.bool_)  # for their first reset

@@ -178,11 +178,9 @@ class Case:
         What it is, a few words.
     must : str
         What must come out, one line with the closed form.
-    run : callable, optional
+    run : callable
         Setting -> checks. Its docstring derives outcome and tolerance and gives the source. It may raise
-        `UnsupportedError`. None: not built yet.
-    missing : str
-        Why `run` is None.
+        `UnsupportedError`.
     peers : bool
         Whether `run` looks at nothing but state, time and `step`, so that other engines can be held against it.
     faults : mapping
@@ -194,11 +192,6 @@ class Case:
     name: str
     title: str
     must: str
-    run: Callable[[Setting], Sequence[Check]] | None = None
-    missing: str = ""
+    run: Callable[[Setting], Sequence[Check]]
     peers: bool = False
     faults: Mapping[str, str] = field(default_factory=dict)
-
-    def __post_init__(self):
-        if (self.run is None) != bool(self.missing):
-            raise ValueError(f"Case {self.number} must have either a run or what is missing")

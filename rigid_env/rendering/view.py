@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -62,22 +62,38 @@ def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
     return middle - reach, middle + reach
 
 
+@dataclass(frozen=True)
+class RenderArguments:
+    """Arguments about pictures for a viewer of an environment.
+
+    Attributes
+    ----------
+    render_mode : {"rgb_array", "human"} or None
+        None draws nothing.
+    width, height : int
+        [px].
+    camera : Camera, mapping or None
+        As of `rigid_env.rendering.camera_argument.as_camera`.
+    arrows : bool
+        Whether contacts, forces and torques are drawn.
+    """
+
+    render_mode: RenderMode | None = None
+    width: int = 960
+    height: int = 600
+    camera: CameraArgument = field(default=None, kw_only=True)
+    arrows: bool = field(default=True, kw_only=True)
+
+
 class View:
     """View of a task's worlds; makes its renderer with the first picture, and leaves it out of pickles.
 
     Parameters
     ----------
-    mode : {"rgb_array", "human"} or None
-        None draws nothing.
-    width, height : int
-        [px].
+    given : RenderArguments
     fps : float
         [1/s].
     title : str
-    camera : Camera, mapping or None
-        As of `rigid_env.rendering.camera_argument.as_camera`.
-    arrows : bool
-        Whether contacts, forces and torques are drawn.
 
     Raises
     ------
@@ -87,25 +103,17 @@ class View:
         If there is a mode, but no pygame.
     """
 
-    def __init__(
-        self,
-        mode: str | None,
-        width: int,
-        height: int,
-        fps: float,
-        title: str,
-        camera: CameraArgument = None,
-        arrows: bool = True,
-    ):
+    def __init__(self, given: RenderArguments, fps: float, title: str):
+        mode = given.render_mode
         if mode is not None and mode not in RENDER_MODES:
             raise ValueError(f"render_mode is {mode!r}; allowed are None, {', '.join(map(repr, RENDER_MODES))}")
-        for name, value in (("width", width), ("height", height)):
+        for name, value in (("width", given.width), ("height", given.height)):
             if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
-        self.camera, self.arrows = as_camera(camera), as_switch(arrows, "arrows")
+        self.camera, self.arrows = as_camera(given.camera), as_switch(given.arrows, "arrows")
         if mode is not None:
             require("render", "pygame", purpose="rendering")
-        self.mode, self.width, self.height, self.fps, self.title = mode, width, height, fps, title
+        self.mode, self.width, self.height, self.fps, self.title = mode, given.width, given.height, fps, title
         self._renderer: Renderer | None = None
 
     def draw(self, task: Task, world: int = 0) -> np.ndarray:

@@ -8,7 +8,8 @@ from rigid_env.tasks import compiled, observe
 from rigid_env.tasks.actions import Force, Impulse, Wrench
 from rigid_env.tasks.block_reach import BlockReach
 from rigid_env.tasks.block_reorient import BlockReorient
-from rigid_env.tasks.distributions import Choice, Distribution, LogUniform, Normal, Uniform
+from rigid_env.tasks.distribution import Distribution
+from rigid_env.tasks.distributions import Choice, LogUniform, Normal, Uniform
 from rigid_env.tasks.disturbances import Gust, Push
 from rigid_env.tasks.entries import Entry
 from rigid_env.tasks.task import Task

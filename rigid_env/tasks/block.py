@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 import physics
-from physics.annotations import Effect, Layout, Preset
+from physics.annotations import Layout
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import Wrench
 from rigid_env.tasks.area import Area
+from rigid_env.tasks.arguments import BatchArguments, ControlArguments, part, takes
 from rigid_env.tasks.block_draws import YAW, EdgesInside, Face, OnFloor
-from rigid_env.tasks.distributions import LAST, Distribution, Uniform
+from rigid_env.tasks.distribution import LAST, Distribution
+from rigid_env.tasks.distributions import Uniform
 from rigid_env.tasks.kernels import start_poses
 from rigid_env.tasks.parameters import LENGTHS, Edges, Number, middle, parse_range, scene_size
 from rigid_env.tasks.task import Task
@@ -26,6 +28,24 @@ TORQUE_SHARE = 0.5
 """Largest torque over m g times the longest half edge. To tip the block, a torque alone must exceed m g times the half
 edge that its centre has to pass over. The default tips the 5 x 3 x 2 m block over its shortest half edge. It is too
 weak for the others without the force's help, momentum, or a wall."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockArguments:
+    """Arguments of the block's tasks alone; see `BlockTask`."""
+
+    walls: Layout = "three"
+    half_width: float = 10.0
+    mass: Number = 6.0
+    size: Edges = (5.0, 3.0, 2.0)
+    friction: Number = 0.5
+    restitution: Number = 0.2
+    gravity: Number = 9.81
+
+
+@dataclass(frozen=True)
+class _Arguments(ControlArguments, BlockArguments, BatchArguments):
+    pass
 
 
 class BlockTask(Task):
@@ -66,37 +86,17 @@ class BlockTask(Task):
     goal_draw: ClassVar[str | None] = None
     error_name: ClassVar[str]
 
-    def __init__(
-        self,
-        worlds: int = 1,
-        *,
-        accuracy: Preset | physics.Accuracy = "balanced",
-        walls: Layout = "three",
-        half_width: float = 10.0,
-        mass: Number = 6.0,
-        size: Edges = (5.0, 3.0, 2.0),
-        friction: Number = 0.5,
-        restitution: Number = 0.2,
-        gravity: Number = 9.81,
-        effects: Iterable[Effect] = (),
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
-        threads: int = 1,
-    ) -> None:
-        self.area = Area(walls, half_width)
-        given = {"mass": mass, "size": size, "friction": friction, "restitution": restitution, "gravity": gravity}
-        self._parameters = {field: parse_range(field, given[field]) for field in LENGTHS}
+    @takes(_Arguments)
+    def __init__(self, given: _Arguments) -> None:
+        self.area = Area(given.walls, given.half_width)
+        self._parameters = {field: parse_range(field, getattr(given, field)) for field in LENGTHS}
         edges = self._parameters["size"]
         self._largest = (
             edges.high if isinstance(edges, Uniform) else edges.at(np.full((1, edges.uniforms), LAST), {})[0]
         )
         self.area.check_room(self._largest)
         self._parameters["size"] = EdgesInside(edges, self.area)
-        super().__init__(
-            worlds, accuracy=accuracy, effects=effects, frame_skip=frame_skip, dt=dt, dump_faults=dump_faults,
-            threads=threads,
-        )  # fmt: skip
+        super().__init__(given.worlds, **part(given, ControlArguments))
 
     def declared_draws(self) -> Mapping[str, Any]:
         """Place, yaw and face of the start, the goal, and the five parameters."""

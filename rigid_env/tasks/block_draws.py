@@ -7,7 +7,8 @@ import reprlib
 import numpy as np
 
 from rigid_env.tasks.area import Area
-from rigid_env.tasks.distributions import Choice, Distribution, Uniform, read_numbers
+from rigid_env.tasks.distribution import Distribution, read_numbers
+from rigid_env.tasks.distributions import Choice, Uniform
 
 FACE_COUNT = 6
 

@@ -9,7 +9,7 @@ import numpy as np
 
 import physics
 from rigid_env.tasks.actions import Wrench
-from rigid_env.tasks.distributions import Distribution
+from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.entries import Entry
 from rigid_env.tasks.worlds import Worlds
 

@@ -17,47 +17,12 @@ from physics.scene.body_names import body_label
 from physics.summary import counted
 from rigid_env.tasks.actions import IMPULSE, TORQUE
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.draws import parameter_of
 from rigid_env.tasks.goal import GoalTask
+from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meaning, draw_meaning
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.written import Part, sentences, written_parts
 
 WIDTH = 79  # of lines of text [characters]
-
-ARGUMENTS = {
-    "accuracy": "preset of the engine, or a `physics.Accuracy`",
-    "effects": "`physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class",
-    "draws": "distributions instead of the task's, by name",
-    "frame_skip": "physics steps per control step",
-    "dt": "physics step [s]",
-    "dump_faults": "folder for what led to a state that was not finite (`rigid-env replay`)",
-    "threads": "threads that share a step of a batch",
-}
-"""Meanings of the arguments that all tasks have."""
-
-OF_ENVIRONMENTS = {
-    "render_mode": '`"rgb_array"`, `"human"` or None',
-    "width": "of pictures [px]",
-    "height": "of pictures [px]",
-    "obs": 'observations: `"state"`, the table above, or `"pixels"`, pictures (uint8)',
-    "obs_size": "height and width of these [px]",
-    "obs_stack": "of the last so many control steps, along the last axis, the newest last",
-    "contacts": "contacts told in `info`, those with the largest forces",
-    "impacts": "pairs that collided told in `info`: the largest impulses",
-    "camera": "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room",
-    "arrows": "whether pictures show contacts, forces and torques",
-}
-"""Meanings of the arguments that environments add."""
-
-PARAMETERS = {
-    "mass": "mass [kg]",
-    "size": "edges or diameters [m]",
-    "radius": "radius of a sphere [m]",
-    "friction": "Coulomb coefficient",
-    "restitution": "restitution",
-    "gravity": "strength of gravity [m/s²]",
-}
-"""Meanings of draws that are physical parameters."""
 
 REACH = "longest half extent, of a hull the farthest along a body axis from the centre of mass"
 """Meaning of the unit of torques over the weight."""
@@ -206,7 +171,7 @@ def _rewards(task: Task) -> Section:
 
 def _starts(task: Task) -> Section:
     rows = tuple(
-        (f"`{name}`", each.describe(), str(each.length), _meaning(name))
+        (f"`{name}`", each.describe(), str(each.length), draw_meaning(name))
         for name, each in task.distributions.items()
         if name in task.own_draws
     )
@@ -258,7 +223,7 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
         for name, parameter in inspect.signature(kind.__init__).parameters.items()
         if name not in ("self", "worlds")
     }
-    meanings = {**{name: _argument_text(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    meanings = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
     return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
@@ -305,30 +270,6 @@ def _named(section: Section, names: tuple[str, ...]) -> Section:
 
     rows = tuple(tuple(re.sub(r"\bbody (\d+)", label, cell) for cell in row) for row in section.rows)
     return replace(section, rows=rows)
-
-
-def _meaning(name: str) -> str:
-    """Meaning of a draw, with its unit where it is a physical parameter."""
-    found = parameter_of(name)
-    if found is None:
-        return "the task's own"
-    parameter, body = found
-    return PARAMETERS[parameter] + ("" if body is None else f" of body {body}")
-
-
-def _argument_text(kind: type, name: str) -> str:
-    """Meaning of an argument: of a draw of its name, or of the docstrings' ``Parameters``."""
-    if parameter_of(name):
-        return _meaning(name)
-    for owner in kind.__mro__:
-        doc = inspect.cleandoc(owner.__doc__ or "")
-        parts = re.search(r"^Parameters\n-+\n(.*?)(?=\n\w+\n-+\n|\n## |\Z)", doc, re.DOTALL | re.MULTILINE)
-        for names, text in re.findall(
-            r"^(\S[^:\n]*?)(?: :.*)?\n((?: {4}.*\n?)+)", parts[1] if parts else "", re.MULTILINE
-        ):
-            if name in names.split(", "):
-                return " ".join(text.split())
-    return ""
 
 
 def _default(value: Any) -> str:

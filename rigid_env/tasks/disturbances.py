@@ -15,7 +15,8 @@ import numpy as np
 
 from physics import validation
 from rigid_env.tasks.actions import check_axes, check_body
-from rigid_env.tasks.distributions import Distribution, as_distribution
+from rigid_env.tasks.distribution import Distribution
+from rigid_env.tasks.distributions import as_distribution
 from rigid_env.tasks.task_parts import Disturbed
 
 UNIFORMS = 5  # of one disturbance: direction (2), size (1), duration (1), wait (1)

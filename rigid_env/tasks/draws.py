@@ -10,7 +10,8 @@ import numpy as np
 
 from physics.summary import shown
 from physics.world.world import World
-from rigid_env.tasks.distributions import Distribution, is_elementwise, is_of_user
+from rigid_env.tasks.distribution import Distribution, is_of_user
+from rigid_env.tasks.distributions import is_elementwise
 from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
 
 SEED = 0

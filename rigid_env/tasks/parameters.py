@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physics import validation
-from rigid_env.tasks.distributions import Distribution, Uniform
+from rigid_env.tasks.distribution import Distribution
+from rigid_env.tasks.distributions import Uniform
 
 Number = float | Sequence[float] | NDArray[Any] | Distribution
 """Type of an argument: a value, a range (low, high) to draw from, or a distribution."""

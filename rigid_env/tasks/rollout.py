@@ -17,8 +17,9 @@ from physics.undo import undo_on_error
 from physics.world.batch_arrays import machine_memory
 from physics.world.report import Status, gravest
 from rigid_env.tasks import layout as col
+from rigid_env.tasks.restoring import put, remember
 from rigid_env.tasks.rollout_steps import Kept, end_control
-from rigid_env.tasks.state import TaskState, put, remember
+from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.wrenches import begin_control
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +10,14 @@ import numpy as np
 
 import physics
 from physics import validation
+from physics.annotations import Frame
 from physics.io.toml import SceneFile
 from physics.scene.body_names import body_index, told_bodies
 from physics.summary import shown
 from rigid_env.tasks.actions import FRAMES
-from rigid_env.tasks.distributions import Uniform, read_numbers
+from rigid_env.tasks.arguments import ControlArguments, part
+from rigid_env.tasks.distribution import read_numbers
+from rigid_env.tasks.distributions import Uniform
 from rigid_env.tasks.observe import LENGTH, REACH
 from rigid_env.tasks.scene_section import Section, body_indices
 
@@ -24,15 +27,31 @@ FORCE, TORQUE = 0.9, 0.5
 LIMITS = {"force": FORCE, "torque": TORQUE}
 """Keys of the limits, with their defaults."""
 
-FRAME_SKIP, DT = 5, 0.005
-"""Physics steps per control step, and their length [s]."""
-
 GOAL_SPEED = 0.1
 """[m/s] Largest speed at which a goal counts as reached."""
 
 KEYS = ("driven", "force", "torque", "frame", "length", "goal", "start", "frame_skip", "dt", "max_episode_steps")
 GOAL_KEYS = ("body", "pos", "low", "high", "tolerance", "speed")
 START_KEYS = ("pos", "linvel", "angvel")
+
+Driven = str | int | Sequence[str | int]
+"""Type of an argument: the names or indices of bodies, or that of one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneArguments:
+    """Arguments about what happens in a scene; see `rigid_env.tasks.scene_task.SceneTask`."""
+
+    driven: Driven | None = None
+    force: float | None = None
+    torque: float | None = None
+    frame: Frame | None = None
+    length: float | None = None
+    goal: Mapping[str, Any] | None = None
+    start: Mapping[str, Any] | None = None
+    frame_skip: int | None = None
+    dt: float | None = None
+    episode_steps: int | None = None
 
 
 class Place(Uniform):
@@ -100,15 +119,14 @@ class SettingsReader:
     ----------
     scene : physics.Scene
     file : SceneFile or None
-    given : mapping
-        Arguments by the names of `KEYS`; None: not given.
+    given : SceneArguments
     """
 
-    def __init__(self, scene: physics.Scene, file: SceneFile | None, given: Mapping[str, Any]):
+    def __init__(self, scene: physics.Scene, file: SceneFile | None, given: SceneArguments):
         self._scene = scene
         table = file.others.get("environment", {}) if file is not None else {}
         self._file = Section(table, "environment", file.lines) if file is not None else Section({})
-        self._given = Section({key: value for key, value in given.items() if value is not None})
+        self._given = Section({key: value for key, value in part(given, SceneArguments).items() if value is not None})
 
     def section(self, key: str) -> Section:
         """Section that contains a key."""
@@ -134,7 +152,8 @@ class SettingsReader:
         return Settings(
             driven, force, torque, self._value("frame", _frame, FRAMES[0]), length,
             goal=self._goal(driven[0], length), start=self._start(),
-            frame_skip=self._value("frame_skip", validation.count, FRAME_SKIP), dt=self._value("dt", _positive, DT),
+            frame_skip=self._value("frame_skip", validation.count, ControlArguments.frame_skip),
+            dt=self._value("dt", _positive, ControlArguments.dt),
             max_episode_steps=self._value("max_episode_steps", validation.count, None),
         )  # fmt: skip
 

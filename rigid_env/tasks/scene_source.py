@@ -22,6 +22,9 @@ SCENE_FILES = (".toml", *MJCF_FILES)
 ENDINGS = f"{', '.join(SCENE_FILES[:-1])} or {SCENE_FILES[-1]}"
 """The same in words."""
 
+SceneSource = physics.Scene | str | os.PathLike
+"""Type of an argument: a scene, the name of a canonical one, or a file."""
+
 
 class Found(NamedTuple):
     """Scene of a user, and further contents of its file.
@@ -40,7 +43,7 @@ class Found(NamedTuple):
     file: SceneFile | None
 
 
-def find_scene(scene: physics.Scene | str | os.PathLike) -> Found:
+def find_scene(scene: SceneSource | None) -> Found:
     """Scene given as an object, by the name of a canonical scene, or as a file.
 
     Raises

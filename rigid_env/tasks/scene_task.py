@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
 import numpy as np
 
 from physics import validation
@@ -10,9 +14,10 @@ from physics.world.setters import check_depth
 from rigid_env.tasks import layout as col
 from rigid_env.tasks import observe
 from rigid_env.tasks.actions import Wrench
+from rigid_env.tasks.arguments import BatchArguments, EngineArguments, part, takes
 from rigid_env.tasks.distributions import Uniform
-from rigid_env.tasks.scene_settings import SettingsReader
-from rigid_env.tasks.scene_source import find_scene
+from rigid_env.tasks.scene_settings import SceneArguments, SettingsReader
+from rigid_env.tasks.scene_source import SceneSource, find_scene
 from rigid_env.tasks.task import Task
 
 BONUS = 5.0
@@ -20,6 +25,18 @@ BONUS = 5.0
 
 START = "a start as far off as it may be"
 """Subject of errors about starts inside a wall."""
+
+
+@dataclass(frozen=True)
+class SceneArgument:
+    """Scene of an environment; see `SceneTask`."""
+
+    scene: SceneSource | None = None
+
+
+@dataclass(frozen=True)
+class _Arguments(EngineArguments, SceneArguments, SceneArgument, BatchArguments):
+    draws: Mapping[str, Any] | None = field(default=None, kw_only=True)
 
 
 class SceneTask(Task):
@@ -49,45 +66,22 @@ class SceneTask(Task):
         Naming file, line and key or the argument, the value, and what is allowed.
     """
 
-    def __init__(
-        self,
-        worlds=1,
-        scene=None,
-        *,
-        driven=None,
-        force=None,
-        torque=None,
-        frame=None,
-        length=None,
-        goal=None,
-        start=None,
-        frame_skip=None,
-        dt=None,
-        episode_steps=None,
-        accuracy="balanced",
-        effects=(),
-        draws=None,
-        dump_faults=None,
-        threads=1,
-    ):
-        self.name, self.scene, file = find_scene(scene)
-        given = {
-            "driven": driven, "force": force, "torque": torque, "frame": frame, "length": length, "goal": goal,
-            "start": start, "frame_skip": frame_skip, "dt": dt,
-        }  # fmt: skip
+    @takes(_Arguments)
+    def __init__(self, given: _Arguments) -> None:
+        self.name, self.scene, file = find_scene(given.scene)
         reader = SettingsReader(self.scene, file, given)
         self.settings = settings = reader.settings()
         self.max_episode_steps = settings.max_episode_steps
-        if episode_steps is not None:
-            self.max_episode_steps = validation.count(episode_steps, "episode_steps")
+        if given.episode_steps is not None:
+            self.max_episode_steps = validation.count(given.episode_steps, "episode_steps")
         limits = {"force": settings.force, "torque": settings.torque, "frame": settings.frame}
         self.actions = [Wrench(body, **limits) for body in settings.driven]
         self.draws = self._declared()
         self._reader = reader  # for errors, as long as the task is made
         self.memory = {} if settings.goal is None else {"closeness": 1, "gain": 1}
         super().__init__(
-            worlds, accuracy=accuracy, effects=effects, draws=draws, frame_skip=settings.frame_skip, dt=settings.dt,
-            dump_faults=dump_faults, threads=threads,
+            given.worlds, draws=given.draws, frame_skip=settings.frame_skip, dt=settings.dt,
+            **part(given, EngineArguments),
         )  # fmt: skip
         del self._reader
 

@@ -19,12 +19,13 @@ from physics.undo import undo_on_error
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.distributions import Distribution, as_distribution, is_of_user
+from rigid_env.tasks.distribution import Distribution, is_of_user
+from rigid_env.tasks.distributions import as_distribution
 from rigid_env.tasks.draws import parameter_of, world_arguments
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.parameters import DRAWN_LENGTHS
 from rigid_env.tasks.replacing import refuse_replaced, replaced
-from rigid_env.tasks.state import remember
+from rigid_env.tasks.restoring import remember
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

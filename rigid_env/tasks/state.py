@@ -1,10 +1,10 @@
-"""State of a task: a copy of all that decides the future of its worlds and episodes."""
+"""State of a task: a copy of all that decides the future of its worlds and episodes, and its file."""
 
 from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,14 +15,10 @@ import numpy as np
 import physics
 from physics import validation
 from physics.html_table import parts_table
-from physics.undo import Undo
-from physics.world import choice, restoring
 from physics.world.headed_file import FileKind, head_value, is_count, is_text
 from rigid_env.tasks.draws import parameter_of
-from rigid_env.tasks.state_settings import check_settings
 
 HELD = "held "
-OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
 FILE = FileKind(
     "task state", "state of a task", "TaskState.save", format=3, oldest=3, missing="all settings of the task"
 )
@@ -175,167 +171,3 @@ def _of_json(state: Mapping[str, Any] | None) -> dict[str, Any] | None:
         else:
             found[key] = int(value) if str(value).lstrip("-").isdigit() else str(value)
     return found
-
-
-def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], worlds=None) -> TaskState:
-    """Copy the state of a task.
-
-    Parameters
-    ----------
-    task : Task
-    arrays : mapping of str to (worlds, ...) array
-        More that goes along, of an environment.
-    seeds : sequence
-        Of the generators.
-    worlds : (k,) array_like of int, or mask, optional
-        Worlds meant; None: all.
-
-    Raises
-    ------
-    ValueError
-        A world that is not there, or named twice.
-    """
-    chosen: Any = slice(None) if worlds is None else choice.world_indices(worlds, task.worlds)
-    indices = range(task.worlds) if worlds is None else chosen.tolist()
-    states = [task.generators[world] for world in indices]
-    return TaskState(
-        type(task).__name__,
-        task.settings_of_state,
-        task.world.snapshot(worlds),
-        {name: array[chosen].copy() for name, array in {**task.state_arrays(), **arrays}.items()},
-        {name: array[chosen].copy() for name, array in task.episodes.held.items()},
-        tuple(sorted(task.episodes.varying)),
-        tuple(None if each is None else each.bit_generator.state for each in states),
-        tuple(seeds[world] for world in indices),
-    )
-
-
-def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, source=None) -> tuple:
-    """Continue worlds of a task from a state; after an error nothing has changed.
-
-    Parameters
-    ----------
-    task : Task
-    arrays : mapping of str to (worlds, ...) array
-        As of `take`; they are written.
-    state : TaskState
-    worlds, source
-        As of `physics.World.restore`.
-
-    Returns
-    -------
-    chosen, sources : (k,) int64
-        Worlds that changed, and the worlds of the state that they go on from.
-
-    Raises
-    ------
-    ValueError
-        It is no state, one of another task or of other settings, or indices out of range.
-    """
-    validation.instance(state, TaskState, "state", "what get_state gives")
-    _check(task, arrays, state)
-    places = restoring.find_targets(task.world, state.world, worlds, source)
-    if not places.is_all and state.held.keys() != task.episodes.held.keys():
-        ours, theirs = (", ".join(held) or "nothing" for held in (task.episodes.held, state.held))
-        raise ValueError(f"state holds {theirs}, the task {ours}; allowed is the same, or a state for all worlds")
-    task.world.restore_targets(state.world, places)
-    chosen, sources = _indices(task.worlds, state.worlds, places)
-    if places.worlds is None and places.source is None and state.worlds == task.worlds:
-        _write(task, arrays, state, slice(None), slice(None))
-    else:
-        _write(task, arrays, state, chosen, sources)
-    if state.held or task.episodes.held:
-        _hold(task, state, chosen, sources, places.is_all)
-    task.episodes.varying.update(state.told)
-    _put_generators(task.generators, state.generators, chosen.tolist(), sources.tolist())
-    return chosen, sources
-
-
-def remember(task, rows: np.ndarray | None = None) -> Undo:
-    """Copy a task, some worlds or all: to put it back is to go on from there."""
-    before = take(task, {}, [None] * task.worlds, rows)
-
-    def put_back() -> None:
-        put(task, {}, before, rows)
-
-    return put_back
-
-
-def _indices(worlds: int, held: int, places: restoring.Targets) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of the worlds that change, and of those of the state from which they continue."""
-    chosen = np.arange(worlds) if places.worlds is None else places.worlds
-    if places.source is not None:
-        return chosen, places.source
-    return chosen, np.arange(held) if held == len(chosen) else np.zeros(len(chosen), dtype=np.int64)
-
-
-def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sources) -> None:
-    """Copy rows `sources` of a state into rows `chosen` of a task and its environment."""
-    given = state.arrays
-    if type(sources) is slice:  # all, in their order
-        for own in (task.kept_arrays, arrays):
-            for name, array in own.items():
-                array[...] = given[name]
-    else:
-        for own in (task.kept_arrays, arrays):
-            for name, array in own.items():
-                array[chosen] = given[name][sources]
-    task.adopt(chosen, given["steps"][sources])
-
-
-def _hold(task, state: TaskState, chosen: np.ndarray, sources: np.ndarray, is_all: bool) -> None:
-    """Give the task the held values of the state."""
-    held = task.episodes.held
-    for name, values in state.held.items():
-        held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]
-    if is_all:
-        for name in held.keys() - state.held.keys():
-            del held[name]
-
-
-def _put_generators(generators: list, states: Sequence[dict[str, Any] | None], chosen: list, sources: list) -> None:
-    for world, of in zip(chosen, sources):
-        state = states[of]
-        if state is None:
-            generators[world] = None
-            continue
-        if generators[world] is None:
-            generators[world] = np.random.Generator(np.random.PCG64())
-        generators[world].bit_generator.state = state
-
-
-def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
-    """Refuse a state of another task, or of one with other settings or parts."""
-    name = type(task).__name__
-    if state.task != name:
-        raise ValueError(f"state is {state!r}; allowed are states of {name}")
-    if state.settings != task.settings_of_state:
-        check_settings(name, task.settings_of_state, state.settings)
-    given, kept = state.arrays, task.kept_arrays
-    has_all = given.keys() >= kept.keys() and given.keys() >= arrays.keys()
-    if not has_all or len(given) != len(kept) + len(arrays) + 1:
-        odd = given.keys() ^ {*kept, *arrays, "steps"}
-        if arrays or odd - OF_ENVIRONMENTS:
-            names = ", ".join(sorted(odd))
-            raise ValueError(f"state is {state!r}, with other parts ({names}); allowed are states of the same settings")
-    count, is_alike = state.worlds, state.worlds == task.worlds
-    for own in (kept, arrays):
-        for part, array in own.items():
-            value = given[part]
-            if not is_alike or value.shape != array.shape or value.dtype is not array.dtype:  # rarely
-                _check_part(part, value, array, count)
-    _check_part("steps", given["steps"], task.status, count)
-    for part in state.told:
-        if part not in task.episodes.parameters:
-            allowed = ", ".join(task.episodes.parameters) or "none"
-            raise ValueError(f"state tells worlds of {part}, which {name} does not draw; allowed are {allowed}")
-    for part, value in state.held.items():
-        if part not in task.drawn:
-            raise ValueError(f"state holds {part}, which {name} does not draw; allowed are {', '.join(task.drawn)}")
-        _check_part(f"held {part}", value, task.drawn[part], count)
-
-
-def _check_part(part: str, value: np.ndarray, array: np.ndarray, count: int) -> None:
-    if value.shape[1:] != array.shape[1:] or value.dtype != array.dtype or len(value) != count:
-        allowed = f"{(count, *array.shape[1:])} of {array.dtype}"
-        raise ValueError(f"{part} of state has shape {value.shape} of {value.dtype}; allowed is {allowed}")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,17 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 
 import physics
 from physics import validation
-from physics.annotations import Effect, Preset
 from physics.kernels.state import layout as at
 from physics.parallel.bound_call import Work, bound_alike, compiled
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
+from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
 from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
-from rigid_env.tasks.distributions import Distribution
+from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
 from rigid_env.tasks.entries import Observation
@@ -40,6 +40,11 @@ OF_PROCESS = (
     "rollout_observers",
 )  # fmt: skip
 """Names of attributes left out of copies: machine code, and functions of the class."""
+
+
+@dataclass(frozen=True)
+class _Arguments(ControlArguments, BatchArguments):
+    draws: Mapping[str, Any] | None = field(default=None, kw_only=True)
 
 
 class Task(Starts):
@@ -104,24 +109,15 @@ class Task(Starts):
         Naming the field, the value and what is allowed.
     """
 
-    def __init__(
-        self,
-        worlds: int = 1,
-        *,
-        accuracy: Preset | physics.Accuracy = "balanced",
-        effects: Iterable[Effect] = (),
-        draws: Mapping[str, Any] | None = None,
-        frame_skip: int = 5,
-        dt: float = 0.005,
-        dump_faults: str | Path | None = None,
-        threads: int = 1,
-    ) -> None:
-        self.frame_skip = validation.count(frame_skip, "frame_skip")
+    @takes(_Arguments)
+    def __init__(self, given: _Arguments) -> None:
+        self.frame_skip = validation.count(given.frame_skip, "frame_skip")
         checked_limit(self.max_episode_steps, f"max_episode_steps of {type(self).__name__}")
-        distributions = distributions_of(self.declared_draws(), draws)
+        distributions = distributions_of(self.declared_draws(), given.draws)
         varied = [name for name, each in distributions.items() if not each.is_fixed]
-        self.effects = checked_effects(effects, varied)
-        self.world = physics.World(self._scene(distributions), worlds, dt, accuracy, threads)
+        self.effects = checked_effects(given.effects, varied)
+        scene = self._scene(distributions)
+        self.world = physics.World(scene, given.worlds, given.dt, given.accuracy, given.threads)
         check_draws(type(self).__name__, distributions, self.world)
         self._check_starts()
         bodies = self.world.scene.bodies
@@ -140,8 +136,8 @@ class Task(Starts):
             self.world, self.frame_skip, self._table.has_impulses, any(isinstance(each, Push) for each in disturbances),
             self.observer if self.compiled else None,
         )  # fmt: skip
-        if dump_faults is not None:
-            physics.Recorder(self.world, folder=dump_faults)
+        if given.dump_faults is not None:
+            physics.Recorder(self.world, folder=given.dump_faults)
         self.disturbed = Disturbances(disturbances, self) if disturbances else None
         self._note_parameters(np.arange(self.worlds))
         self.outcome = np.zeros((self.worlds, col.INFO + len(self.measures) + len(self.terms)))

@@ -85,7 +85,7 @@ def outcomes() -> list[Outcome]:
         Check("period over 2000 flips", 33.195123456, 9.3e-6, "s"),
     ]
     return [
-        Outcome(case, "rigid-env", accuracy, dt, list(Status)[k % 4], (checks[k % 2],), "", 12.34)
+        Outcome(case, "rigid-env", accuracy, dt, list(Status)[k % len(Status)], (checks[k % 2],), "", 12.34)
         for k, case in enumerate(registry.CASES)
         for accuracy in ("balanced", "precise")
         for dt in (0.001, 0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import physics
-from rigid_env.hard_cases.cases import random_scenes
+from rigid_env.hard_cases.cases import random_draws, random_scenes
 
 # Family, worlds, seed, accuracy: before resting stages, places put right and failed solves were kept from giving energy
 # (decision 14), 1, 3 and 2 worlds of ellipsoids broke a law in these, 5, 7 and 5 of several bodies, and 2, 1 and 1 of
@@ -21,7 +21,7 @@ DRAWS = [
 @pytest.mark.exhaustive
 @pytest.mark.parametrize(("family", "worlds", "seed", "accuracy"), DRAWS)
 def test_no_law_is_broken(family, worlds, seed, accuracy):
-    world = physics.World(random_scenes.scene_of(family), worlds=worlds, dt=0.01, accuracy=accuracy)
+    world = physics.World(random_draws.scene_of(family), worlds=worlds, dt=0.01, accuracy=accuracy)
     limit = random_scenes.gain_limit(accuracy)
     outcome = random_scenes.drive(world, np.random.default_rng(seed))
     broken = np.flatnonzero(outcome.broken_laws(limit))

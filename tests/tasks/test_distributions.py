@@ -13,7 +13,8 @@ from scipy import stats
 import physics
 from rigid_env import Distribution, TaskEnv
 from rigid_env.tasks import Choice, LogUniform, Normal, Uniform
-from rigid_env.tasks.distributions import LAST, as_distribution
+from rigid_env.tasks.distribution import LAST
+from rigid_env.tasks.distributions import as_distribution
 from tests.tasks.conftest import Slide, started
 
 DRAWS = 20_000

@@ -13,7 +13,8 @@ from rigid_env import BlockReach, BlockReachEnv, BlockReachGoal, BlockReorient, 
 from rigid_env.tasks import Gust, Impulse, Push, Task, Wrench
 from rigid_env.tasks import rollout as module
 from rigid_env.tasks.layout import FAILURE, REWARD, SUCCESS
-from rigid_env.tasks.state import TaskState, put, take
+from rigid_env.tasks.restoring import put, take
+from rigid_env.tasks.state import TaskState
 from tests.physics.test_field_errors import Reaching
 from tests.tasks.conftest import Slide, started
 from tests.tiers.sweep import sweep

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_env import BlockReach, rollout
-from rigid_env.tasks.state import take
+from rigid_env.tasks.restoring import take
 from tests.physics.test_html_table import rows_of
 from tests.tasks.conftest import started
 

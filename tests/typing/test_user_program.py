@@ -18,6 +18,7 @@ MISTAKES = {
     "method": ("world.snapshot()", "world.snapsot()"),
     "preset": ('accuracy="fast"', 'accuracy="fasst"'),
     "keyword": ("threads=2", "thread=2"),
+    "keyword of an environment": ('walls="corner"', 'wall="corner"'),
     "shape": ("physics.Ellipsoid(", "physics.Elipsoid("),
     "effect": ("physics.Gravity([0", "physics.Gravitation([0"),
 }

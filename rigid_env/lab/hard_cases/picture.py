@@ -28,7 +28,7 @@ def write_picture(path: Path, report: Report) -> None:
     axes.set_ylim(len(cases) - 0.5, -0.5)
     axes.set_yticks(range(len(cases)), [f"{number} {name}" for number, name in cases], fontsize=7)
     axes.set_xticks(range(len(columns)), [f"{a} {1e3 * dt:g} ms" for a, dt in columns], fontsize=7, rotation=90)
-    axes.set_title("green: holds (pale: little margin)   red: fails   grey: not supported, not built", fontsize=8)
+    axes.set_title("green: holds (pale: little margin)   red: fails   grey: not supported", fontsize=8)
     axes.tick_params(length=0)
     for side in axes.spines.values():
         side.set_visible(False)

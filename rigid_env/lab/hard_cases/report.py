@@ -11,13 +11,13 @@ from rich.console import Console
 
 from physics import validation
 from physics.accuracy import PRESETS
-from rigid_env.extras import install_line
 from rigid_env.hard_cases.case import Case, Setting
 from rigid_env.lab.hard_cases import show
 from rigid_env.lab.hard_cases.peers import run_peer
 from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case
+from rigid_env.lab.measure.accuracy import load_peers
 from rigid_env.lab.measure.machine import write_json
-from rigid_env.lab.measure.peers import ENGINES, Engine, is_installed, load
+from rigid_env.lab.measure.peers import ENGINES, Engine
 from rigid_env.terminal import progress_bar
 
 
@@ -126,10 +126,10 @@ class Report:
 
 def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Report:
     """Run all of it with a progress bar; print tables; `keep` holds all outcomes so far. Ctrl-C ends only the run."""
-    names = [name for name in ENGINES if plan.has_peers and is_installed(name)]
-    if missing := [name for name in ENGINES if plan.has_peers and name not in names]:
-        console.print(f"without {', '.join(missing)}, not installed: {install_line('peers')}", soft_wrap=True)
-    todo, report = _jobs(plan, [load(name) for name in names]), Report(plan)
+    engines, missing = load_peers(tuple(ENGINES) if plan.has_peers else ())
+    for message in missing:
+        console.print(f"skipped: {message}", soft_wrap=True)
+    todo, report = _jobs(plan, tuple(engines.values())), Report(plan)
     with progress_bar(console) as progress:
         task = progress.add_task("hard cases", total=len(todo))
         try:

@@ -20,7 +20,6 @@ class Status(Enum):
     HOLDS = "holds"
     FAILS = "fails"
     UNSUPPORTED = "not supported"
-    MISSING = "not built"
 
 
 @dataclass(frozen=True)
@@ -81,16 +80,15 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
     engine, accuracy : str
         As in `Outcome`; None: the setting's preset.
     """
-    start, checks, reason, status = time.perf_counter(), (), case.missing, Status.MISSING
-    if case.run is not None:
-        try:
-            with np.errstate(all="ignore"):  # what has blown up is for the checks to say
-                checks = tuple(case.run(setting))
-            status = Status.HOLDS if checks and all(check.passes for check in checks) else Status.FAILS
-            reason = "" if checks else "no check was made"
-        except UnsupportedError as error:
-            status, reason = Status.UNSUPPORTED, str(error)
-        except Exception as error:  # of one case: the others are still to be run
-            status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
+    start, checks = time.perf_counter(), ()
+    try:
+        with np.errstate(all="ignore"):  # what has blown up is for the checks to say
+            checks = tuple(case.run(setting))
+        status = Status.HOLDS if checks and all(check.passes for check in checks) else Status.FAILS
+        reason = "" if checks else "no check was made"
+    except UnsupportedError as error:
+        status, reason = Status.UNSUPPORTED, str(error)
+    except Exception as error:  # of one case: the others are still to be run
+        status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
     return Outcome(case, engine, accuracy or str(setting.accuracy), setting.dt, status, checks, reason, seconds)

@@ -12,9 +12,9 @@ from rigid_env.lab.hard_cases.run import Outcome, Status
 from rigid_env.lab.measure.table import number
 from rigid_env.terminal import Column, Table, number_columns
 
-COLOURS = {Status.HOLDS: "green", Status.FAILS: "red", Status.UNSUPPORTED: "yellow", Status.MISSING: "yellow"}
-MARKS = {Status.HOLDS: "✓", Status.FAILS: "✗", Status.UNSUPPORTED: "-", Status.MISSING: "·"}
-LEGEND = "✓ holds   ✗ fails   - not supported   · not built"
+COLOURS = {Status.HOLDS: "green", Status.FAILS: "red", Status.UNSUPPORTED: "yellow"}
+MARKS = {Status.HOLDS: "✓", Status.FAILS: "✗", Status.UNSUPPORTED: "-"}
+LEGEND = "✓ holds   ✗ fails   - not supported"
 
 
 def came_out(outcome: Outcome) -> str:

@@ -207,7 +207,7 @@ def is_stopping(gap, speed, slop, h):
 
 
 @kernel
-def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
+def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     """Add a contact to the set if it touches, or could within h; return whether there was room.
 
     A body that turns far touches at its `arrival_gap`.
@@ -221,8 +221,10 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
     owner : int
         Body that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass, each with its own
         point.
-    normal, point_a, point_b : tuples of 3 floats
-        Out of b; nearest points of a and b, world frame [m].
+    normal : tuple of 3 floats
+        Out of b, world frame.
+    points : pair of tuples of 3 floats
+        Nearest points of a and b, world frame [m].
     gap, h : float
         [m], [s].
     """
@@ -231,11 +233,11 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
         many.counts[NUM_DROPPED] += 1
         return False
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, b
-    _write_anchor(k, a, 0, point_a, many)
+    _write_anchor(k, a, 0, points[0], many)
     acceleration = many.bodies.work[a].acceleration
     partner = count - 1 - b
     if b >= 0:
-        _write_anchor(k, b, 3, point_b, many)
+        _write_anchor(k, b, 3, points[1], many)
         if owner != PARTED:
             _join_points(k, a, b, owner, gap, normal, many)
         acceleration += many.bodies.work[b].acceleration
@@ -270,9 +272,9 @@ def add_contact(a, b, feature, owner, normal, point_a, point_b, gap, h, many):
 def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
     """Record the only contact of a and b, of which one is `first`; n points out of the other one."""
     if first == a:
-        add_contact(a, b, 0, -1, n, on_first, on_second, gap, h, many)
+        add_contact(a, b, 0, -1, n, (on_first, on_second), gap, h, many)
     else:
-        add_contact(a, b, 0, -1, (-n[0], -n[1], -n[2]), on_second, on_first, gap, h, many)
+        add_contact(a, b, 0, -1, (-n[0], -n[1], -n[2]), (on_second, on_first), gap, h, many)
 
 
 @inlined

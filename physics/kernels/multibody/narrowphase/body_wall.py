@@ -29,11 +29,11 @@ def collide_body_wall(b, wall, margin, h, many):
             gap = d + geo.vertex_height(e, vertex)
             if gap <= margin:
                 point = add_scaled(x, 1.0, geo.vertex_arm(dims, R, vertex))
-                add_contact(b, -1 - wall, vertex, -1, n, point, point, gap, h, many)
+                add_contact(b, -1 - wall, vertex, -1, n, (point, point), gap, h, many)
     else:
         gap = d - geo.support(body.shape, dims, e)
         point = add_scaled(x, 1.0, geo.support_arm(body.shape, dims, R, n, e))
-        add_contact(b, -1 - wall, 0, -1, n, point, point, gap, h, many)
+        add_contact(b, -1 - wall, 0, -1, n, (point, point), gap, h, many)
 
 
 @kernel
@@ -52,4 +52,4 @@ def collide_hull_wall(b, wall, margin, h, many):
         gap = d + qt.dot(n, r)
         if gap <= margin:
             point = add_scaled(x, 1.0, r)
-            add_contact(b, -1 - wall, k, -1, n, point, point, gap, h, many)
+            add_contact(b, -1 - wall, k, -1, n, (point, point), gap, h, many)

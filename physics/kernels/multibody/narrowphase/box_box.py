@@ -123,9 +123,9 @@ def _add_face_contacts(a, b, face, source, count, least, h, many):
             face * _FEATURES_PER_FACE + 8 * many.narrowphase.edge[source, k, 0] + many.narrowphase.edge[source, k, 1]
         )
         if face < 3:
-            add_contact(a, b, feature, owner, (-n[0], -n[1], -n[2]), on_face, on_other, gap, h, many)
+            add_contact(a, b, feature, owner, (-n[0], -n[1], -n[2]), (on_face, on_other), gap, h, many)
         else:
-            add_contact(a, b, feature, owner, n, on_other, on_face, gap, h, many)
+            add_contact(a, b, feature, owner, n, (on_other, on_face), gap, h, many)
 
 
 @inlined
@@ -156,7 +156,7 @@ def _add_edge_contact(a, b, edges, gap, h, many):
     t = (c * qt.dot(x, w) - qt.dot(y, w)) / (1.0 - c * c)
     s = clamp_to_half_width(qt.dot(x, w) + t * c, many.bodies.work[a].dims[i])
     t = clamp_to_half_width(t, many.bodies.work[b].dims[j])
-    add_contact(a, b, _FIRST_EDGE_FEATURE + edges, -1, n, add_scaled(p, s, x), add_scaled(q, t, y), gap, h, many)
+    add_contact(a, b, _FIRST_EDGE_FEATURE + edges, -1, n, (add_scaled(p, s, x), add_scaled(q, t, y)), gap, h, many)
 
 
 @kernel

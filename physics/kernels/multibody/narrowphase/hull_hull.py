@@ -160,9 +160,9 @@ def _add_face_contacts(a, b, which, face, source, count, least, h, many):
         into, out_of = hulls.sides[source, k, 0], hulls.sides[source, k, 1]
         feature = ((which * _MAX_FACES + face) * 2 * CLIP_SIDE_OFFSET + into) * 2 * CLIP_SIDE_OFFSET + out_of
         if which == 0:
-            add_contact(a, b, feature, a, (-out[0], -out[1], -out[2]), on_face, on_other, height + lift, h, many)
+            add_contact(a, b, feature, a, (-out[0], -out[1], -out[2]), (on_face, on_other), height + lift, h, many)
         else:
-            add_contact(a, b, feature, b, out, on_other, on_face, height + lift, h, many)
+            add_contact(a, b, feature, b, out, (on_other, on_face), height + lift, h, many)
 
 
 @inlined
@@ -178,7 +178,7 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
     t = min(max(t, 0.0), 1.0)
     on_a, on_b = add_scaled(add_scaled(origin, 1.0, p), s, d), add_scaled(add_scaled(origin, 1.0, q), t, e)
     feature = _FIRST_EDGE_FEATURE + i * _MAX_EDGES + j
-    add_contact(a, b, feature, -1, (-n[0], -n[1], -n[2]), on_a, on_b, gap, h, many)
+    add_contact(a, b, feature, -1, (-n[0], -n[1], -n[2]), (on_a, on_b), gap, h, many)
 
 
 @kernel

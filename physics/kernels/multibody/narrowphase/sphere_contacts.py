@@ -28,7 +28,7 @@ def collide_spheres(a, b, margin, h, many):
     if size - ra - rb > margin:
         return
     n = (n[0] / size, n[1] / size, n[2] / size) if size > 0.0 else (0.0, 1.0, 0.0)
-    add_contact(a, b, 0, -1, n, add_scaled(x, -ra, n), add_scaled(y, rb, n), size - ra - rb, h, many)
+    add_contact(a, b, 0, -1, n, (add_scaled(x, -ra, n), add_scaled(y, rb, n)), size - ra - rb, h, many)
 
 
 @inlined

@@ -261,7 +261,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     if _moves_as_foreseen(a, b, gap, n, h, many):
         return True, to
     many.counts[NUM_CONTACTS] = to
-    add_contact(a, b, FEATURES_PER_PAIR - 1, PARTED, m, p, q, gap, h, many)
+    add_contact(a, b, FEATURES_PER_PAIR - 1, PARTED, m, (p, q), gap, h, many)
     return True, many.counts[NUM_CONTACTS]
 
 

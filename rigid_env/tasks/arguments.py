@@ -1,0 +1,77 @@
+"""Groups of arguments that several constructors take: each is a dataclass, written once, with types and defaults."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar, get_type_hints
+
+import physics
+from physics.annotations import Effect, Preset
+
+P = ParamSpec("P")
+Made = TypeVar("Made")
+Group = TypeVar("Group")
+
+
+def takes(group: Callable[P, Group]) -> Callable[[Callable[[Made, Group], None]], Callable[Concatenate[Made, P], None]]:
+    """Let a constructor, written for a group of arguments, take each of them by its name and place.
+
+    The group is a dataclass, often one that joins others by inheritance: fields of the last base come first. Editors,
+    type checkers, `help` and `inspect.signature` see its fields as parameters of the constructor.
+
+    Parameters
+    ----------
+    group : dataclass
+        Of this constructor alone: errors of a call then name the constructor.
+
+    Returns
+    -------
+    A decorator of ``__init__(self, given)``, where `given` is an instance of the group.
+    """
+
+    def spread(init: Callable[[Made, Group], None]) -> Callable[Concatenate[Made, P], None]:
+        def __init__(self: Made, *args: P.args, **kwargs: P.kwargs) -> None:
+            init(self, group(*args, **kwargs))
+
+        found: Any = functools.update_wrapper(__init__, init)
+        made = next(iter(inspect.signature(init).parameters.values()))
+        found.__signature__ = inspect.Signature([made, *inspect.signature(group).parameters.values()])
+        found.__annotations__ = get_type_hints(group)
+        group.__init__.__qualname__ = init.__qualname__  # type: ignore[misc]
+        return found
+
+    return spread
+
+
+def part(given: Any, *groups: type) -> dict[str, Any]:
+    """Arguments of these groups among those given, by name, for the constructor that takes them."""
+    return {each.name: getattr(given, each.name) for group in groups for each in fields(group)}
+
+
+@dataclass(frozen=True)
+class BatchArguments:
+    """Size of a batch; see `rigid_env.Task`."""
+
+    worlds: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineArguments:
+    """Arguments of the world of every task; see `rigid_env.Task`."""
+
+    accuracy: Preset | physics.Accuracy = "balanced"
+    effects: Iterable[Effect] = ()
+    dump_faults: str | Path | None = None
+    threads: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlArguments(EngineArguments):
+    """Arguments of a task whose control step has a default; see `rigid_env.Task`."""
+
+    frame_skip: int = 5
+    dt: float = 0.005

@@ -1,0 +1,67 @@
+"""Meanings of arguments and draws, in words for the documentation of a task."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+from rigid_env.tasks.draws import parameter_of
+
+ARGUMENTS = {
+    "accuracy": "preset of the engine, or a `physics.Accuracy`",
+    "effects": "`physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class",
+    "draws": "distributions instead of the task's, by name",
+    "frame_skip": "physics steps per control step",
+    "dt": "physics step [s]",
+    "dump_faults": "folder for what led to a state that was not finite (`rigid-env replay`)",
+    "threads": "threads that share a step of a batch",
+}
+"""Meanings of the arguments that all tasks have."""
+
+OF_ENVIRONMENTS = {
+    "render_mode": '`"rgb_array"`, `"human"` or None',
+    "width": "of pictures [px]",
+    "height": "of pictures [px]",
+    "obs": 'observations: `"state"`, the table above, or `"pixels"`, pictures (uint8)',
+    "obs_size": "height and width of these [px]",
+    "obs_stack": "of the last so many control steps, along the last axis, the newest last",
+    "contacts": "contacts told in `info`, those with the largest forces",
+    "impacts": "pairs that collided told in `info`: the largest impulses",
+    "camera": "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room",
+    "arrows": "whether pictures show contacts, forces and torques",
+}
+"""Meanings of the arguments that environments add."""
+
+PARAMETERS = {
+    "mass": "mass [kg]",
+    "size": "edges or diameters [m]",
+    "radius": "radius of a sphere [m]",
+    "friction": "Coulomb coefficient",
+    "restitution": "restitution",
+    "gravity": "strength of gravity [m/s²]",
+}
+"""Meanings of draws that are physical parameters."""
+
+
+def draw_meaning(name: str) -> str:
+    """Meaning of a draw, with its unit where it is a physical parameter."""
+    found = parameter_of(name)
+    if found is None:
+        return "the task's own"
+    parameter, body = found
+    return PARAMETERS[parameter] + ("" if body is None else f" of body {body}")
+
+
+def argument_meaning(kind: type, name: str) -> str:
+    """Meaning of an argument: of a draw of its name, or of the docstrings' ``Parameters``."""
+    if parameter_of(name):
+        return draw_meaning(name)
+    for owner in kind.__mro__:
+        doc = inspect.cleandoc(owner.__doc__ or "")
+        parts = re.search(r"^Parameters\n-+\n(.*?)(?=\n\w+\n-+\n|\n## |\Z)", doc, re.DOTALL | re.MULTILINE)
+        for names, text in re.findall(
+            r"^(\S[^:\n]*?)(?: :.*)?\n((?: {4}.*\n?)+)", parts[1] if parts else "", re.MULTILINE
+        ):
+            if name in names.split(", "):
+                return " ".join(text.split())
+    return ""
