@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from physics.kernels.compile.decorators import cold_kernel, inlined, kernel, runtime_kernel, shared_kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel, runtime_kernel, shared_kernel
 from tests.kernels.anew import anew
 
 
@@ -152,7 +152,7 @@ from numba.core.codegen import JITCodeLibrary
 import numpy as np
 import physics
 from physics import scenes
-from physics.kernels.compile.fused.calling_convention import MayRaise
+from physics.compiler.fused.calling_convention import MayRaise
 
 optimised, lowered, statuses = collections.Counter(), collections.Counter(), []
 MayRaise.__init__ = lambda self, name: statuses.append(name)
@@ -228,7 +228,7 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
 STANDING = """
 import collections, sys
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.compile.decorators import kernel, shared_kernel
+from physics.compiler.decorators import kernel, shared_kernel
 
 optimised, optimise = collections.Counter(), JITCodeLibrary._optimize_final_module
 
@@ -306,7 +306,7 @@ def test_nothing_of_what_stands_is_in_what_calls_it():
 RECORDS = """
 import sys
 import numpy as np
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 
 @kernel
 def total(row):

@@ -1,0 +1,127 @@
+"""Code libraries of kernels: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
+
+The private part of Numba used here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import NamedTuple
+
+from llvmlite import binding as llvm
+from numba.core import cgutils
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
+
+from physics.compiler.fused.ablation import is_on
+
+
+class KernelOrigin(NamedTuple):
+    """Origin of shared machine code: a kernel, and the types of its arguments.
+
+    Parameters
+    ----------
+    module, name : str
+    args : tuple of numba.types.Type
+    """
+
+    module: str
+    name: str
+    args: tuple
+
+    def load(self) -> None:
+        """Load the machine code into memory."""
+        getattr(importlib.import_module(self.module), self.name).stand(self.args)
+
+
+class PartLibrary(JITCodeLibrary):
+    """IR of one part, neither linked nor optimised."""
+
+    def add_ir_module(self, ir_module):
+        """Add a module; it is the same in every whole that calls the part."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"
+        self._final_module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        self._final_module.data_layout = self._codegen._data_layout
+
+    def _get_module_for_linking(self):
+        return self._final_module
+
+    def finalize(self):
+        self._finalized = True
+
+
+class WholeLibrary(JITCodeLibrary):
+    """IR of a whole, linked with that of every part below it before it is optimised.
+
+    Attributes
+    ----------
+    called : tuple of KernelOrigin
+        The kernels that stand, of those below it.
+    """
+
+    called: tuple[KernelOrigin, ...] = ()
+
+    def finalize(self):
+        below = _callers_first(self)
+        self.called = tuple(dict.fromkeys(origin for each in below for origin in _standing(each)))
+        self._linking_libraries = [each for each in below if not isinstance(each, SharedLibrary)]
+        super().finalize()
+
+    def _optimize_final_module(self):
+        for function in self._final_module.functions if is_on("internal_parts") else ():
+            if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
+                function.linkage = "internal"
+        super()._optimize_final_module()
+
+
+class OptimisedPart(WholeLibrary):
+    """Machine code of one part and all below it, as Numba makes it; callers optimise it once more."""
+
+    def _optimize_final_module(self):
+        JITCodeLibrary._optimize_final_module(self)
+
+
+class SharedLibrary(WholeLibrary):
+    """Machine code of a shared kernel, called by symbol.
+
+    Attributes
+    ----------
+    origin : KernelOrigin
+        What it was made of.
+    """
+
+    origin: KernelOrigin
+
+    def machine_code(self) -> bytes:
+        """Machine code in its form on disk."""
+        self._ensure_finalized()
+        return self._get_compiled_object()
+
+    def take(self, machine_code: bytes) -> None:
+        """Take machine code from disk."""
+        self.enable_object_caching()
+        self._set_compiled_object(machine_code)
+        self._finalize_final_module()
+
+
+def _standing(library: CodeLibrary) -> tuple[KernelOrigin, ...]:
+    """Shared kernels that a library adds to those of its caller."""
+    if isinstance(library, SharedLibrary):
+        return (library.origin,)
+    return library.called if isinstance(library, OptimisedPart) else ()
+
+
+def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:
+    """Every library below `whole` once, after all of its callers: the linker drops uncalled functions."""
+    callees_first: dict[CodeLibrary, None] = {}
+
+    def visit(library):
+        for callee in library._linking_libraries:
+            if callee not in callees_first:
+                if isinstance(callee, PartLibrary):
+                    visit(callee)
+                callees_first[callee] = None
+
+    visit(whole)
+    return list(reversed(callees_first))
