@@ -304,3 +304,41 @@ def test_a_symbol_names_the_content_of_a_record_type(tmp_path):
         command = [sys.executable, program, count]
         names.add(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
     assert len(names) == 2
+
+
+NAMESAKES = f"""
+import math, sys
+from physics.compiler.decorators import kernel
+
+def make(shift):
+    @kernel
+    def part(x):
+{"".join(f"        x = math.sin(x) + math.cos(x) * math.tan(x) + math.exp(-{k} * x * x){chr(10)}" for k in range(40))}
+        return shift + 0.0 * math.tanh(x)
+    return part
+
+one, two = make(1.0), make(2.0)
+
+@kernel
+def twice_one(x):
+    return one(x) + one(2.0 * x)
+
+@kernel
+def twice_two(x):
+    return two(x) + two(2.0 * x)
+
+print(*(globals()[name](0.5) for name in sys.argv[1].split(",")))
+"""
+
+
+def test_parts_of_one_name_from_two_processes_do_not_meet_in_a_third(tmp_path):
+    """As a user's helper does that was edited between two sessions. Too long to be inlined, they keep their names."""
+    program = tmp_path / "namesakes.py"
+    program.write_text(NAMESAKES)
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])}
+
+    def printed(names: str) -> str:
+        command = [sys.executable, program, names]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.strip()
+
+    assert [printed(names) for names in ("twice_one", "twice_two", "twice_one,twice_two")] == ["2.0", "4.0", "2.0 4.0"]

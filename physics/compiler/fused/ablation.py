@@ -21,7 +21,6 @@ OPTIMISATIONS = {
     "fused_products": "a product in a sum is rounded with it; the last bits of results depend on it",
     "indices_from_front": "no index is asked whether it is negative",
     "inlined_kernels": "no call is left of what is a few instructions long",
-    "internal_parts": "the optimiser knows that nobody outside calls a part",
     "lowering": "a variable that is assigned once is a value without memory; none is read or cleared to release it",
     "memoised_contexts": "types and lowerings of operations and sizes of types are determined once",
     "passes": "a kernel goes through the passes that it needs, not through all of Numba's",

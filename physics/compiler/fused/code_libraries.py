@@ -12,8 +12,6 @@ from llvmlite import binding as llvm
 from numba.core import cgutils
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
-from physics.compiler.fused.ablation import is_on
-
 
 class KernelOrigin(NamedTuple):
     """Origin of shared machine code: a kernel, and the types of its arguments.
@@ -54,6 +52,9 @@ class PartLibrary(JITCodeLibrary):
 class WholeLibrary(JITCodeLibrary):
     """IR of a whole, linked with that of every part below it before it is optimised.
 
+    Its parts are its own. Two wholes on disk may have parts of one name that differ, made by two processes; a third
+    process that loads both would run one part in both.
+
     Attributes
     ----------
     called : tuple of KernelOrigin
@@ -69,7 +70,7 @@ class WholeLibrary(JITCodeLibrary):
         super().finalize()
 
     def _optimize_final_module(self):
-        for function in self._final_module.functions if is_on("internal_parts") else ():
+        for function in self._final_module.functions:
             if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
                 function.linkage = "internal"
         super()._optimize_final_module()

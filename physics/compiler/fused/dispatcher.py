@@ -19,8 +19,8 @@ needed.
 
 A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
 the types of the process. So two processes may give the same names to machine code for two different records, and a
-third process that loads both from disk would run the parts of one in the other. Here a digest of the types is part of
-each name.
+third process that loads both from disk would run the shared kernels of one in the other. Here a digest of the types is
+part of each name. The parts of a whole are its own (`code_libraries.WholeLibrary`).
 
 `pipeline_class` is Numba's documented way to change the passes of a function. Code that needs private parts of Numba
 stands in `code_libraries` and `disk_cache`.
