@@ -65,7 +65,7 @@ class WholeLibrary(JITCodeLibrary):
 
     def finalize(self):
         below = _callers_first(self)
-        self.called = tuple(dict.fromkeys(origin for each in below for origin in _standing(each)))
+        self.called = tuple(each.origin for each in below if isinstance(each, SharedLibrary))
         self._linking_libraries = [each for each in below if not isinstance(each, SharedLibrary)]
         super().finalize()
 
@@ -74,13 +74,6 @@ class WholeLibrary(JITCodeLibrary):
             if function.linkage.name == "linkonce_odr" and not function.is_declaration:  # a part
                 function.linkage = "internal"
         super()._optimize_final_module()
-
-
-class OptimisedPart(WholeLibrary):
-    """Machine code of one part and all below it, as Numba makes it; callers optimise it once more."""
-
-    def _optimize_final_module(self):
-        JITCodeLibrary._optimize_final_module(self)
 
 
 class SharedLibrary(WholeLibrary):
@@ -104,13 +97,6 @@ class SharedLibrary(WholeLibrary):
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()
-
-
-def _standing(library: CodeLibrary) -> tuple[KernelOrigin, ...]:
-    """Shared kernels that a library adds to those of its caller."""
-    if isinstance(library, SharedLibrary):
-        return (library.origin,)
-    return library.called if isinstance(library, OptimisedPart) else ()
 
 
 def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:

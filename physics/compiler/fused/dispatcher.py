@@ -40,13 +40,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import NativeLowering
 
 from physics.compiler.fused.ablation import is_on
-from physics.compiler.fused.code_libraries import (
-    KernelOrigin,
-    OptimisedPart,
-    PartLibrary,
-    SharedLibrary,
-    WholeLibrary,
-)
+from physics.compiler.fused.code_libraries import KernelOrigin, PartLibrary, SharedLibrary, WholeLibrary
 from physics.compiler.fused.disk_cache import SharedCache, WholeCache, register_library
 from physics.compiler.fused.lowering import KernelLowering, UserLowering
 from physics.compiler.fused.memoised_contexts import MemoisedTarget, memoised
@@ -106,7 +100,7 @@ class _KeepAsPart(LoweringPass):
 class _PartCompiler(_WholeCompiler):
     """Compiler of a part: it stops at LLVM IR."""
 
-    library_class = PartLibrary if is_on("code_libraries") else OptimisedPart
+    library_class = PartLibrary
     is_entered = False
 
     def __init__(self, *arguments):
