@@ -15,10 +15,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from numba.core.codegen import CPUCodeLibrary
+from numba.core.typeinfer import CallConstraint
 
 import physics
 from physics.compiler.decorators import kernel, runtime_kernel
 from physics.compiler.fused.code_libraries import PartLibrary
+from physics.compiler.fused.type_inference import _Network
 from physics.compiler.simd import Lanes
 from tests.kernels.anew import anew
 
@@ -685,3 +687,31 @@ def calls_becomes_float(n):
 
 def test_a_variable_gets_the_type_that_all_its_values_have():
     assert calls_becomes_float(4) == 3.0 + 5.0
+
+
+@kernel
+def two_calls(x):
+    return abs(x) + abs(x + 1.0)
+
+
+def test_a_constraint_is_looked_at_again_only_if_something_changed(monkeypatch):
+    looked = []
+
+    def noted(constraint, typeinfer, resolve=CallConstraint.resolve):
+        looked.append(constraint)
+        resolve(constraint, typeinfer, *[typeinfer.typevars], fnty=typeinfer.typevars[constraint.func].getone())
+
+    rounds = []
+    propagate = _Network.propagate
+
+    def counted_rounds(network, typeinfer):
+        rounds.append(network)
+        return propagate(network, typeinfer)
+
+    monkeypatch.setattr(_Network, "propagate", counted_rounds)
+    monkeypatch.setattr(CallConstraint, "__call__", noted)
+
+    assert anew(two_calls)(-3.0) == 5.0
+    assert len(rounds) == 2  # the second to see that nothing changes
+    calls = [each for each in looked if type(each) is CallConstraint]
+    assert len(calls) == len(set(map(id, calls))) == 2

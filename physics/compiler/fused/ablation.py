@@ -28,6 +28,7 @@ OPTIMISATIONS = {
     "scalars": "max, min, int and powers of numbers are written in place, not compiled as functions",
     "shared_kernels": "large kernels that know no plan are made machine code once for all plans",
     "simd_types": "an operation on lanes is one of vectors, not one for each lane",
+    "type_inference": "a constraint is looked at again only if a type in it has changed",
     "untimed_parts": "no clocks run while a part is compiled",
 }
 

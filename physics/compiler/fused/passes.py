@@ -22,11 +22,11 @@ from numba.core.typed_passes import (
     NoPythonBackend,
     NopythonTypeInference,
     PreLowerStripPhis,
-    type_inference_stage,
 )
 from numba.core.untyped_passes import DeadBranchPrune, FixupArgs, RewriteSemanticConstants
 
 from physics.compiler.fused.ablation import is_on
+from physics.compiler.fused.type_inference import infer_types
 
 
 class _Plain(FunctionPass):
@@ -86,14 +86,12 @@ class _SingleAssignment(_Plain):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _Types(_Plain):
-    """Pass that finds types of variables and targets of calls; a kernel may return an array that it was not given."""
+    """Pass that finds types of variables and targets of calls."""
 
     _name = "kernel_types"
 
     def change(self, state):
-        state.typemap, state.return_type, state.calltypes, _ = type_inference_stage(
-            state.typingctx, state.targetctx, state.func_ir, state.args, return_type=None
-        )
+        infer_types(state)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

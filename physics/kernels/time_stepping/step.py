@@ -20,8 +20,8 @@ target velocity of stage 5 at the end of the step (`target_velocity.set_resting_
 slip of few contacts (`midpoint_friction`) make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives as None and is pruned by the compiler (`decorators.kernel`). Kernels that take a
-state and return one are inlined, but for those that a step hardly ever needs: to pass thirteen numbers through memory
-took a quarter of the time of a block at rest.
+state and return one are inlined, but for those that a step hardly ever needs: to pass thirteen numbers through memory took
+a quarter of the time of a block at rest.
 
 References
 ----------
