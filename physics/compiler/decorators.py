@@ -57,6 +57,16 @@ def entry_kernel(function):
     return backend.entry(function)
 
 
+def cold_kernel(function):
+    """Compile a `kernel` that steps seldom need: `fused` does not inline it.
+
+    LLVM copies a function with one call into its caller, however long it is. The caller's usual path then has fewer
+    registers for its numbers, and moves them to the stack and back.
+    """
+    function.is_cold = True
+    return backend.part(function)
+
+
 def shared_kernel(function):
     """Compile a `kernel` that all plans share: `fused` gives it its own machine code (`fused.dispatcher`)."""
     return backend.shared_part(function)

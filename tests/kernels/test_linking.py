@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from physics.compiler.decorators import inlined, kernel, runtime_kernel, shared_kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel, runtime_kernel, shared_kernel
 from tests.kernels.anew import anew
 
 
@@ -97,6 +97,36 @@ def test_what_an_inlined_function_calls_is_not_inlined_for_that():
         for function in (halved, quartered)
     }
     assert inlined_parts == {"halved": [False], "quartered": [True]}
+
+
+@cold_kernel
+def tripled(x):
+    return 3.0 * x
+
+
+@kernel
+def doubled(x):
+    return 2.0 * x
+
+
+@kernel
+def calls_each_once(x):
+    return tripled(x) + doubled(x)
+
+
+def test_of_a_cold_kernel_a_call_is_left(monkeypatch):
+    """Names the calls that LLVM leaves: of a kernel called from one place none, but of a cold one, however short."""
+    left, optimise = [], JITCodeLibrary._optimize_final_module
+
+    def noted(library):
+        optimise(library)
+        left.extend(f.name for f in library._final_module.functions if not f.is_declaration)
+
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", noted)
+    assert anew(calls_each_once)(complex(2.0)) == 10.0
+    assert [part for part in ("tripled", "doubled") if any(f"{len(part)}{part}B" in name for name in left)] == [
+        "tripled"
+    ]
 
 
 @runtime_kernel

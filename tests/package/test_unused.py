@@ -18,6 +18,7 @@ from tests.docs.snippets import ROOT
 PACKAGES = ("physics", "rigid_env", "agents", "benchmarks")
 CALLED = (
     "kernel",
+    "cold_kernel",
     "entry_kernel",
     "shared_kernel",
     "inlined",

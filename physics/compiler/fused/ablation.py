@@ -16,6 +16,7 @@ VARIABLE = "RIGID_ENV_WITHOUT"
 OPTIMISATIONS = {
     "argument_passing": "large tuples are handed on by address, not word by word",
     "array_elements": "elements of arrays are read and written directly, not by way of a copy of the array's words",
+    "cold_kernels": "a call is left of what a step hardly ever needs",
     "folding_builder": "members of structures and constants are folded while instructions are written",
     "fused_products": "a product in a sum is rounded with it; the last bits of results depend on it",
     "indices_from_front": "no index is asked whether it is negative",

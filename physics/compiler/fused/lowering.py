@@ -63,6 +63,8 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
         super().setup_function(fndesc)
         self.builder = kernel_builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
+        if is_on("cold_kernels") and getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
+            self.function.attributes.add("noinline")
 
     def create_cfunc_wrapper(self):
         """Make the entry for machine code, in place of Numba's for C; see `prepared_entry`."""

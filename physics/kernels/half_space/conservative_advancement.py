@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.flight.free_flight import fly
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.half_space.contact_point import center_arm, wall_normal
@@ -243,7 +243,7 @@ def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, work):
     return gone
 
 
-@kernel
+@cold_kernel
 def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, work):
     """Time, at most `left`, that a stage from y may take, so that a body that turns far passes no wall [s].
 

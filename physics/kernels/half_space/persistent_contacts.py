@@ -8,7 +8,7 @@ left it nor hit it.
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import angular_velocity, apply_inv_inertia, principal_attitude
@@ -42,7 +42,7 @@ def free_gap_acceleration(slot, y, offset_frame, work):
     return n[0] * (a[0] + b[0] + c[0]) + n[1] * (a[1] + b[1] + c[1]) + n[2] * (a[2] + b[2] + c[2])
 
 
-@kernel
+@cold_kernel
 def is_still_pressed(gap, slot, y, h, offset_frame, memory, work):
     """True if a round body that pushed in the last stage is still pressed, so that its gap closes."""
     if not (work.shape == ELLIPSOID and last_normal_impulse(slot, memory, work) > 0.0):

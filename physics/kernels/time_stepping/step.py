@@ -20,8 +20,8 @@ target velocity of stage 5 at the end of the step (`target_velocity.set_resting_
 slip of few contacts (`midpoint_friction`) make the scheme second order between impacts and exact on parabolas.
 
 What a scene does not have arrives as None and is pruned by the compiler (`decorators.kernel`). Kernels that take a
-state and return one are inlined, but for those that a step hardly ever needs: to pass thirteen numbers through memory took
-a quarter of the time of a block at rest.
+state and return one are inlined, but for those that a step hardly ever needs (`cold_kernel`): to pass thirteen numbers
+through memory took a quarter of the time of a block at rest.
 
 References
 ----------
@@ -30,7 +30,7 @@ References
 
 from __future__ import annotations
 
-from physics.compiler.decorators import if_given, inlined, kernel
+from physics.compiler.decorators import cold_kernel, if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.contact_solver.solve import rows_per_contact
@@ -143,7 +143,7 @@ def has_same_pose(y, z):
     return y[0] == z[0] and y[1] == z[1]
 
 
-@kernel
+@cold_kernel
 def keep_out_of_walls(y, offset_frame, work):
     """State y, pushed out of walls where it is deeper than the slop, as bodies that turn by radians may be."""
     return lift_conserving_energy(
@@ -151,7 +151,7 @@ def keep_out_of_walls(y, offset_frame, work):
     )
 
 
-@kernel
+@cold_kernel
 def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     """Shorten a stage over h to its first impact if a feature is through a wall at `end`: (state, time advanced).
 

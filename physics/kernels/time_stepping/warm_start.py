@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 
 
@@ -61,7 +61,7 @@ def store_warm_start(n, width, memory, i, h, work):
             memory[i, base + c] = work.impulse[width * k + c]
 
 
-@kernel
+@cold_kernel
 def add_to_warm_start(n, width, memory, work):
     """Add the impulses in `work.rebound` to those of the same contacts in the resting stage, where forces are read."""
     first = WALL_MEMORY_HEAD + work.slot.shape[0]
