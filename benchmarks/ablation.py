@@ -1,6 +1,6 @@
 """Worth of each optimisation of the compiler: ``python -m benchmarks.ablation [--repeats N] [--only NAME ...]``.
 
-Each optimisation of `physics.kernels.compile.fused.ablation` is left out, in turns with all on (A B, B A). A sample is
+Each optimisation of `physics.compiler.fused.ablation` is left out, in turns with all on (A B, B A). A sample is
 three processes: the first step of `drop` at `balanced` with nothing compiled, that of `drop` without gravity in the
 same folder, and runs of the workloads of `benchmarks.throughput`, whose kernels were compiled before. First steps are
 measured in CPU seconds, as `benchmarks.compile` does. A column is the median of the ratios without over with, turn by
@@ -28,7 +28,7 @@ import typer
 from benchmarks import machine
 from benchmarks.compile import first_step
 from benchmarks.processes import PATIENCE
-from physics.kernels.compile.fused.ablation import BASES, OPTIMISATIONS, VARIABLE
+from physics.compiler.fused.ablation import BASES, OPTIMISATIONS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.timing import interleave
 from rigid_env.terminal import Column, Table, make_console, number_columns

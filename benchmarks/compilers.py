@@ -24,7 +24,7 @@ from rich.progress import Progress
 import physics
 from benchmarks import machine
 from benchmarks.processes import PATIENCE
-from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, NUMBA, PYTHON, VARIABLE
+from physics.compiler.compiler_choice import COMPILERS, FUSED, NUMBA, PYTHON, VARIABLE
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.timing import interleave
 from rigid_env.terminal import Column, Table, make_console, number_columns

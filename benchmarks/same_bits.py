@@ -23,7 +23,7 @@ from rich.progress import track
 
 from benchmarks.bit_scenes import PRESETS, SCENES, STEPS
 from benchmarks.processes import ENDING, PATIENCE, killed_after, wait_for_end
-from physics.kernels.compile.compiler_choice import COMPILERS, VARIABLE
+from physics.compiler.compiler_choice import COMPILERS, VARIABLE
 from rigid_env.lab.measure.machine import write_json
 
 WORKER = Path(__file__).with_name("bit_scenes.py")

@@ -20,7 +20,7 @@ import numpy as np
 import typer
 
 from benchmarks import machine, problems
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.contact_solver.friction_pyramid import solve_pyramid_lcp
 from physics.kernels.contact_solver.gauss_seidel import cone_sweeps, invert_contact_blocks, normal_sweeps
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes

@@ -23,9 +23,10 @@ LAYERS = (
         "physics/kernels, compiled", "#dff3e4",
         (
             "multibody | event_driven | time_stepping", "contact_solver · contact_law · half_space",
-            "forces · flight · state · lcp", "parallel · math · compile",
+            "forces · flight · state · lcp · parallel · math",
         ),
     ),
+    ("physics/compiler", "#eeeeee", ("decorators of kernels, and three compilers behind them",)),
 )  # fmt: skip
 
 PYTHON = ("Env.step(action): check it", "Task.step: clip it to a wrench", "Stepper: make the prepared call")

@@ -21,10 +21,10 @@ import numpy as np
 from physics import validation
 from physics.accuracy import Accuracy
 from physics.analysis.diagnostics import diagnose
+from physics.compiler.cache_folder import folder_name
+from physics.compiler.compiler_choice import COMPILER, FUSED, round_alike
 from physics.html_table import parts_table
 from physics.io.toml import from_toml, to_toml
-from physics.kernels.compile.cache_folder import folder_name
-from physics.kernels.compile.compiler_choice import COMPILER, FUSED, round_alike
 from physics.kernels.state import layout as at
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene

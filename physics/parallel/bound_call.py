@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 
-from physics.kernels.compile.decorators import backend
+from physics.compiler.decorators import backend
 
 if backend.PREPARES_CALLS:
     from physics.parallel.prepared_work import PreparedWork as Work
@@ -44,7 +44,7 @@ def bound(kernel: Callable, *arguments) -> Work:
     Parameters
     ----------
     kernel : Callable
-        Of `physics.kernels.compile.decorators.kernel`.
+        Of `physics.compiler.decorators.kernel`.
     *arguments
         Arrays are bound, not copied: a call reads their contents at its time.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from physics.kernels.compile.decorators import backend
+from physics.compiler.decorators import backend
 
 
 def loop_kernel(function: Callable) -> Callable:

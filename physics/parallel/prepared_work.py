@@ -10,8 +10,8 @@ from itertools import accumulate
 
 import numpy as np
 
-from physics.kernels.compile.decorators import backend, kernel
-from physics.kernels.compile.fused.prepared_calls import (
+from physics.compiler.decorators import backend, kernel
+from physics.compiler.fused.prepared_calls import (
     JOB_ARGUMENTS,
     JOB_ENTRY,
     JOB_EXCEPTION,
@@ -98,7 +98,7 @@ def _performing_one() -> Callable[[int], bool]:
 
 
 def _words(arguments: tuple) -> list[int]:
-    """Words of the arguments as a kernel reads them from memory: see `physics.kernels.compile.fused.prepared_entry`."""
+    """Words of the arguments as a kernel reads them from memory: see `physics.compiler.fused.prepared_entry`."""
     words: list[int] = []
     for value in arguments:
         if isinstance(value, np.ndarray):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.decorators import backend
+from physics.compiler.decorators import backend
 from physics.kernels.parallel import work_stealing as at
 
 if backend.PREPARES_CALLS:

@@ -13,8 +13,8 @@ from dataclasses import fields
 import numpy as np
 
 from physics import validation
-from physics.kernels.compile.decorators import backend, plain_function
-from physics.kernels.compile.user_function import NUMBER, FaultyFunctionError, in_words
+from physics.compiler.decorators import backend, plain_function
+from physics.compiler.user_function import NUMBER, FaultyFunctionError, in_words
 from physics.kernels.forces.force_field_state import ZERO, FieldState
 from physics.parallel.bound_call import compiling
 from physics.scene.field_errors import at, not_compiled, placed

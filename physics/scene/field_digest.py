@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from physics.kernels.compile.decorators import backend, is_compiled, plain_function, user_kernel
+from physics.compiler.decorators import backend, is_compiled, plain_function, user_kernel
 
 
 def digest(*functions: Callable | None) -> str:

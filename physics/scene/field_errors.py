@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import plain_function
+from physics.compiler.decorators import plain_function
 from physics.kernels.forces.force_field_state import FieldState
 from physics.scene.field_digest import called
 

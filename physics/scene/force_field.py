@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physics.annotations import Effect
+from physics.compiler.decorators import is_kernel, plain_function, user_kernel
 from physics.html_table import fields_table
-from physics.kernels.compile.decorators import is_kernel, plain_function, user_kernel
 from physics.kernels.forces.force_field_dispatch import AIR, LOAD, Term
 from physics.scene import field_check
 from physics.scene.field_digest import as_it_is, digest

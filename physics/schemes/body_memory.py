@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.kernels.compile.decorators import entry_kernel, kernel
+from physics.compiler.decorators import entry_kernel, kernel
 from physics.kernels.multibody.data import allocation
 from physics.kernels.multibody.data import arrays as many
 from physics.scene.polyhedra import polyhedra

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 
 ROWS_PER_BODY = 12
 """Rows that contacts are shown in, for each body: a block in a corner touches three walls with four vertices each."""

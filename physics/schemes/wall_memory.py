@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import backend, entry_kernel, kernel
+from physics.compiler.decorators import backend, entry_kernel, kernel
 from physics.kernels.half_space.gap_queries import feature_point
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 from physics.kernels.state import layout as at

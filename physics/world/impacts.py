@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.state import layout as at
 from physics.kernels.time_stepping import event_log as ev
 from physics.schemes.contact_memory import call

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics import validation
-from physics.kernels.compile.decorators import entry_kernel
+from physics.compiler.decorators import entry_kernel
 from physics.kernels.flight.free_rotation import attitude_series, write_attitude_series
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import (

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from physics.compiler.decorators import entry_kernel, kernel
 from physics.html_table import parts_table
-from physics.kernels.compile.decorators import entry_kernel, kernel
 from physics.kernels.state import layout as at
 from physics.scene.body_names import body_label
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.forces.actuator_lag import apply_actuator_lag, clamp_command
 from physics.kernels.state import layout as at
 from physics.world.report import add_rows

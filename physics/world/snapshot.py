@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from physics import validation
+from physics.compiler.compiler_choice import COMPILER
 from physics.html_table import parts_table
-from physics.kernels.compile.compiler_choice import COMPILER
 from physics.kernels.state import layout as at
 from physics.summary import parts_repr
 from physics.version import version
@@ -40,7 +40,7 @@ class Snapshot:
         Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands, oldest first: a list
         of the age of each [s] and the command (worlds * bodies, 6). None without an actuator.
     compiler : str
-        The one that made it (`physics.kernels.compile.compiler_choice`): with another one a world goes on with other
+        The one that made it (`physics.compiler.compiler_choice`): with another one a world goes on with other
         last bits.
     is_read : bool
         It is of a file: whoever restores it looks at its numbers first.

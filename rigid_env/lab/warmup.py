@@ -12,7 +12,7 @@ import numpy as np
 
 import physics
 from physics import scenes
-from physics.kernels.compile.decorators import backend
+from physics.compiler.decorators import backend
 from rigid_env.envs.named import make_named
 from rigid_env.envs.registration import SCENE_ID
 from rigid_env.lab.measure.environments import environment_ids

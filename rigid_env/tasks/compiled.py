@@ -6,7 +6,7 @@ arrays and a whole task.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD
 from physics.kernels.state.layout import ANGVEL, LINVEL, POS, QUAT, WALL_NORMAL, WALL_OFFSET

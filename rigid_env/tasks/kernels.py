@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import entry_kernel, inlined, kernel
+from physics.compiler.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math.quaternion import multiply, to_matrix
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD
 from physics.kernels.state import layout as at

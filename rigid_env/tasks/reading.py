@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.decorators import entry_kernel
+from physics.compiler.decorators import entry_kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.world.report import add_rows
 from physics.world.rollout_loop import END, FIRST, STEP
 from rigid_env.tasks import layout as col

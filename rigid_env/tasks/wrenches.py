@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import entry_kernel, inlined, kernel
+from physics.compiler.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
 from physics.world.rollout_loop import END, FIRST, STEP

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import physics
-from physics.kernels.compile.compiler_choice import FUSED, NUMBA, PYTHON, TESTED_RELEASES, VARIABLE, choose_compiler
+from physics.compiler.compiler_choice import FUSED, NUMBA, PYTHON, TESTED_RELEASES, VARIABLE, choose_compiler
 
 ROOT = Path(physics.__file__).parents[1]
 TESTED = "{}.{}.1".format(*TESTED_RELEASES[-1])
@@ -69,7 +69,7 @@ def imported(compiler: str) -> set[str]:
 
 
 def test_python_needs_no_numba_and_numba_no_private_part():
-    private = "physics.kernels.compile.fused"
+    private = "physics.compiler.fused"
     in_python, in_numba = imported(PYTHON), imported(NUMBA)
     assert "numba" not in in_python
     assert "numba" in in_numba

@@ -9,8 +9,8 @@ import traceback
 import numpy as np
 import pytest
 
-from physics.kernels.compile.interpreted.ieee_source import as_ieee
-from physics.kernels.compile.interpreted.records import records_of
+from physics.compiler.interpreted.ieee_source import as_ieee
+from physics.compiler.interpreted.records import records_of
 
 
 def quotients(x, y):

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from physics.kernels.compile.compiler_choice import NUMBA, PYTHON
+from physics.compiler.compiler_choice import NUMBA, PYTHON
 from tests.compilers.trajectory import by_compiler, trajectory
 
 # The block at three presets, a tower, and, exhaustively, a scene for each shape, law and field

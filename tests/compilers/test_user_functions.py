@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.kernels.compile.compiler_choice import COMPILERS, FUSED, PYTHON, VARIABLE
+from physics.compiler.compiler_choice import COMPILERS, FUSED, PYTHON, VARIABLE
 from tests.tiers.sweep import sweep
 
 PROGRAM = """

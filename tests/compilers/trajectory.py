@@ -12,7 +12,7 @@ import numpy as np
 
 import physics
 from benchmarks.bit_scenes import DT, SCENES
-from physics.kernels.compile.compiler_choice import VARIABLE
+from physics.compiler.compiler_choice import VARIABLE
 
 
 def trajectory(scene: str, preset: str, steps: int, threads: int = 1) -> dict:
@@ -46,7 +46,7 @@ import runpy, sys
 
 class Refuse:
     def find_spec(self, name, path=None, target=None):
-        if name.startswith("physics.kernels.compile.fused"):
+        if name.startswith("physics.compiler.fused"):
             raise ImportError(name)
 
 sys.meta_path.insert(0, Refuse())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.fused.backend import make
+from physics.compiler.fused.backend import make
 
 
 def anew(kernel):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.compiler_choice import COMPILER, PYTHON
-from physics.kernels.compile.interpreted.records import records_of
+from physics.compiler.compiler_choice import COMPILER, PYTHON
+from physics.compiler.interpreted.records import records_of
 
 
 def called(kernel, *arguments):

@@ -13,8 +13,8 @@ import typer
 
 import physics
 from benchmarks import ablation as benchmark
-from physics.kernels.compile import cache_folder
-from physics.kernels.compile.fused import ablation
+from physics.compiler import cache_folder
+from physics.compiler.fused import ablation
 
 SOURCES = Path(physics.__file__).parent
 
@@ -38,7 +38,7 @@ def test_each_switch_is_looked_at_where_its_optimisation_hooks_in():
 
 
 def test_each_module_has_a_switch_or_a_reason_for_having_none():
-    modules = {path.stem for path in (SOURCES / "kernels" / "compile" / "fused").glob("*.py")}
+    modules = {path.stem for path in (SOURCES / "compiler" / "fused").glob("*.py")}
     named = ablation.OPTIMISATIONS.keys() | ablation.BASES.keys() | {"__init__", "ablation"}
     assert modules - named == set()
     assert not ablation.OPTIMISATIONS.keys() & ablation.BASES.keys()
@@ -48,8 +48,8 @@ PROGRAM = """
 import json
 from pathlib import Path
 import numpy as np
-from physics.kernels.compile import cache_folder
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler import cache_folder
+from physics.compiler.decorators import inlined, kernel
 
 @inlined
 def largest(row):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.contact_law.target_velocity import (
     GAP_CLOSING_SHARE,
     NEGLIGIBLE_SLOP_SHARE,

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import physics
-from physics.kernels.compile import cache_folder
+from physics.compiler import cache_folder
 
 
 def test_digest_changes_with_any_edit_and_any_rename(tmp_path: Path):
@@ -28,9 +28,9 @@ def test_digest_changes_with_any_edit_and_any_rename(tmp_path: Path):
 
 
 def test_an_edit_of_any_kernel_makes_other_machine_code(tmp_path: Path):
-    """Kernels stand in many folders, and none of them holds the cache_folder."""
+    """Kernels stand in many folders, and the compilers beside them."""
     shutil.copytree(Path(physics.__file__).parent, tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
-    program = "from physics.kernels.compile.cache_folder import folder_name; print(folder_name())"
+    program = "from physics.compiler.cache_folder import folder_name; print(folder_name())"
 
     def name() -> str:
         environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
@@ -38,11 +38,11 @@ def test_an_edit_of_any_kernel_makes_other_machine_code(tmp_path: Path):
         return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True).stdout
 
     names = [name()]
-    for edited in ("flight/free_flight.py", "multibody/solver/solve.py"):
-        path = tmp_path / "physics" / "kernels" / edited
+    for edited in ("kernels/flight/free_flight.py", "kernels/multibody/solver/solve.py", "compiler/simd.py"):
+        path = tmp_path / "physics" / edited
         path.write_text(path.read_text(encoding="utf-8") + "# edited\n", encoding="utf-8")
         names.append(name())
-    assert len(set(names)) == 3
+    assert len(set(names)) == 4
 
 
 PROGRAM = """

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.half_space.contact_set import SIMULTANEOUS_SLOPS, collect_wall_contacts
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD
 from physics.kernels.math.quaternion import to_matrix

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.fused.atomics import call_address, spin_pause
+from physics.compiler.decorators import kernel
+from physics.compiler.fused.atomics import call_address, spin_pause
 from physics.kernels.parallel.spin_wait_workers import IDLE, RUNNING, SPINNING, STOPPING, WOKEN
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, begin_taking, next_world
 from physics.parallel import processors, thread_team

@@ -16,15 +16,15 @@ from pathlib import Path
 import pytest
 
 from benchmarks.processes import killed_after
-from physics.kernels.compile import cache_folder
-from physics.kernels.compile.fused import cache_files
+from physics.compiler import cache_folder
+from physics.compiler.fused import cache_files
 from tests.tiers.sweep import sweep
 
 ROOT = str(Path(__file__).parents[2])
 
 KERNELS = """
 import math
-from physics.kernels.compile.decorators import entry_kernel, kernel
+from physics.compiler.decorators import entry_kernel, kernel
 
 @kernel
 def part(x):
@@ -160,7 +160,7 @@ def test_damage_is_seen_before_anything_is_unpickled(damage, tmp_path):
 LIBRARY = """
 import math
 import numba
-from physics.kernels.compile.decorators import entry_kernel
+from physics.compiler.decorators import entry_kernel
 
 @numba.njit
 def of_user(x):
@@ -204,7 +204,7 @@ def test_what_cannot_be_unpickled_is_damaged_too(program, kept, tmp_path, monkey
     shutil.copytree(folder, cache)
     path = program.file(cache)
     before = (
-        "import physics\nfrom physics.kernels.compile.fused import disk_cache\n"
+        "import physics\nfrom physics.compiler.fused import disk_cache\n"
         f"disk_cache.dumps = lambda value: {pickle.dumps(Gone()).replace(b'Gone', b'Lost')!r}\n"
     )
     path.unlink()

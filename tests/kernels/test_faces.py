@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.contact_solver.one_contact import FreeBody
 from physics.kernels.contact_solver.patch import gather_patch
 from physics.kernels.contact_solver.patch_start import cold_start_motion

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.half_space.support_function import vertex_height, vertex_heights
 
 EDGES = st.tuples(*[st.floats(-100, 100, allow_subnormal=False)] * 3)

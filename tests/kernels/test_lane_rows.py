@@ -1,12 +1,12 @@
-"""Lanes (`physics.kernels.compile.simd`) as they are compiled against what they mean in plain Python: the same bits."""
+"""Lanes (`physics.compiler.simd`) as they are compiled against what they mean in plain Python: the same bits."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.simd import lane_sqrt, lane_sum, lane_sums, load_lanes, store_lanes
+from physics.compiler.decorators import kernel
+from physics.compiler.simd import lane_sqrt, lane_sum, lane_sums, load_lanes, store_lanes
 
 
 @kernel

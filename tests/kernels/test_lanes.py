@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import (
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import (
     Lanes,
     first_true_lane,
     lane_sqrt,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.multibody.broadphase.sweep_and_prune import find_pairs
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_BATCHES, NUM_CONTACTS, NUM_DROPPED, NUM_PAIRS

@@ -8,7 +8,7 @@ import pytest
 from benchmarks import problems
 from benchmarks.problems import SETTINGS
 from physics import scenes
-from physics.kernels.compile.decorators import entry_kernel
+from physics.compiler.decorators import entry_kernel
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import BodiesWorkspace
 from physics.kernels.multibody.solver import (

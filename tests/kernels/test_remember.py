@@ -11,7 +11,7 @@ from numba.core import types
 from numba.core.registry import cpu_target
 from numba.np.numpy_support import from_dtype
 
-from physics.kernels.compile.fused.memoised_contexts import MemoisedTarget, memoised
+from physics.compiler.fused.memoised_contexts import MemoisedTarget, memoised
 
 PAIRS = [
     (types.float64, types.float64),

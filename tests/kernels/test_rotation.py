@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.flight import free_rotation
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import SERIES_SIZE

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.simd import Lanes
+from physics.compiler.decorators import kernel
+from physics.compiler.simd import Lanes
 from physics.kernels.contact_solver.one_contact import (
     CONTACT_OPENS,
     CONTACT_SLIDES,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from physics.kernels.compile.decorators import by_type, if_given, kernel, when
+from physics.compiler.decorators import by_type, if_given, kernel, when
 
 
 class Inner(NamedTuple):

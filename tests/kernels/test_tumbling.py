@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.half_space.conservative_advancement import safe_advance, spin_bound
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance
 from physics.kernels.state.layout import HULL, SPHERE

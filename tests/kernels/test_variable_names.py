@@ -30,7 +30,14 @@ import physics
 PACKAGE = Path(physics.__file__).parent
 # Kernels, and the modules with kernels of their own besides.
 WORLD = PACKAGE / "world"  # with kernels of its own
-SOURCES = sorted([*(PACKAGE / "kernels").rglob("*.py"), WORLD / "report.py", WORLD / "parameters.py"])
+SOURCES = sorted(
+    [
+        *(PACKAGE / "kernels").rglob("*.py"),
+        *(PACKAGE / "compiler").rglob("*.py"),
+        WORLD / "report.py",
+        WORLD / "parameters.py",
+    ]
+)
 
 # Prefixes that Numba itself puts before the byte: a variable `phi3` meets them like one called `phi`.
 OF_NUMBA = {"assertion_error", "common_constant", "const", "exception", "phi", "predicate", "setup_with_exitfn"}

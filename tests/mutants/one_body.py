@@ -421,42 +421,7 @@ TIME_STEPPING = [
     ),
 ]
 
-COMPILE = [
-    _mutant(
-        "compile-checksum",
-        "The checksum of a kept kernel is not checked.",
-        "compile/fused/cache_files.py",
-        "if data[: len(MAGIC)] != MAGIC or _checksum(purpose, data[head:]) != data[len(MAGIC) : head]:",
-        "if data[: len(MAGIC)] != MAGIC:",
-        "kernels/test_disk.py::test_a_file_for_another_purpose_is_damaged",
-    ),
-    _mutant(
-        "compile-owner",
-        "A kept kernel is read although others may write to its file.",
-        "compile/cache_folder.py",
-        "return status.st_uid in (os.getuid(), 0) and not status.st_mode & WRITABLE_BY_OTHERS",
-        "return status.st_uid in (os.getuid(), 0)",
-        "kernels/test_disk.py::test_a_file_that_others_may_write_is_not_unpickled",
-    ),
-    _mutant(
-        "compile-digest",
-        "The digest of the sources leaves out their subfolders.",
-        "compile/cache_folder.py",
-        'sorted(folder.rglob("*.py"))',
-        'sorted(folder.glob("*.py"))',
-        "kernels/test_compiler.py::test_digest_changes_with_any_edit_and_any_rename",
-    ),
-    _mutant(
-        "compile-range",
-        "A loop that counts downwards does not run.",
-        "compile/fused/ranges.py",
-        "left = builder.sub(stop, start) if stride > 0 else builder.sub(start, stop)",
-        "left = builder.sub(stop, start)",
-        "kernels/test_codegen.py::test_loops_with_steps_that_are_written_down",
-    ),
-]
-
 ONE_BODY = [
     *MATH, *LCP, *FLIGHT, *FORCES, *HALF_SPACE, *CONTACT_LAW, *CONTACT_SOLVER, *EVENT_DRIVEN, *PARALLEL, *STATE,
-    *TIME_STEPPING, *COMPILE,
+    *TIME_STEPPING,
 ]  # fmt: skip

@@ -56,7 +56,7 @@ def test_explain_names_every_effect_and_its_reason():
 LINKED = """
 import json, sys, physics
 from numba.core.codegen import JITCodeLibrary
-from physics.kernels.compile.fused.code_libraries import SharedLibrary
+from physics.compiler.fused.code_libraries import SharedLibrary
 linked, optimise = set(), JITCodeLibrary._optimize_final_module
 
 def noted(library):

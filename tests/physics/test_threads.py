@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 import physics
 from physics import scenes
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.fused.atomics import atomic_add, atomic_load, spin_pause
+from physics.compiler.decorators import kernel
+from physics.compiler.fused.atomics import atomic_add, atomic_load, spin_pause
 from physics.kernels.parallel import spin_wait_workers, work_stealing
 from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORLD, next_world
 from physics.kernels.parallel.work_stealing import begin_taking as turns_begin

@@ -5,7 +5,7 @@ import pytest
 
 import physics
 from physics import schemes
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import clear_report

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.processes import killed_after, wait_for_end
-from physics.kernels.compile.compiler_choice import PYTHON, VARIABLE
+from physics.compiler.compiler_choice import PYTHON, VARIABLE
 
 SILENCE = 1600.0
 """Time without a report after which its process is killed [s]; the time-out of a test in pyproject.toml is shorter."""

@@ -12,7 +12,7 @@ from collections import defaultdict
 
 import pytest
 
-from physics.kernels.compile.compiler_choice import VARIABLE
+from physics.compiler.compiler_choice import VARIABLE
 from tests.tiers.child import Child
 
 MARKS = (

@@ -23,7 +23,7 @@ import os
 
 import pytest
 
-from physics.kernels.compile.compiler_choice import COMPILER
+from physics.compiler.compiler_choice import COMPILER
 
 @pytest.mark.interpreted
 @pytest.mark.parametrize("name", ["a b", "c::d", "é"])

@@ -297,7 +297,7 @@ def test_help_says_that_a_model_runs_code(command):
 # The first two read files that the program itself wrote, in folders of the user: SECURITY.md names them.
 ALLOWED = {
     "agents/checkpoint.py": "checkpoints of training runs",
-    "physics/kernels/compile/fused/cache_files.py": "the kernel cache",
+    "physics/compiler/fused/cache_files.py": "the kernel cache",
     "rigid_env/envs/checks.py": "a pickle that it has just made",
     "rigid_env/envs/infos.py": "a program of quoted names that it has just written",
 }

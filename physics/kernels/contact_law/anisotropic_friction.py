@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, if_law, law_parameter
 

@@ -38,7 +38,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.contact_law.target_velocity import MAX_TARGET_TURN, NEGLIGIBLE_SLOP_SHARE
 from physics.kernels.half_space.contact_point import (

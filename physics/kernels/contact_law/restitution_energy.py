@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import lerp
 from physics.kernels.state.body import apply_inv_inertia, kinetic_energy

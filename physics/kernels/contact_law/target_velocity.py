@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import LANE_COUNT, larger, select_lanes, smaller
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import LANE_COUNT, larger, select_lanes, smaller
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, wall_normal, wall_of
 from physics.kernels.half_space.persistent_contacts import is_persistent_contact
 from physics.kernels.math import quaternion as qt

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import point_velocity
 from physics.kernels.math import quaternion as qt

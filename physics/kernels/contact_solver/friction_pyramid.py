@@ -35,7 +35,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
 from physics.kernels.lcp.scaling_and_certificate import (

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.half_space.contact_point import wall_of
 
 # Columns of `work.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import LANE_COUNT, first_true_lane, lane_sqrt, lane_sum, select_lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import LANE_COUNT, first_true_lane, lane_sqrt, lane_sum, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.half_space.contact_point import contact_arm, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt

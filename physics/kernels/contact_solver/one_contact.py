@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import lane_sqrt
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import lane_sqrt
 from physics.kernels.contact_solver.impulse_distribution import solve_symmetric
 from physics.kernels.math import quaternion as qt
 

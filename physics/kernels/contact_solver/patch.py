@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import Lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import FreeBody
 from physics.kernels.math.simd_gather import gather_column

@@ -16,8 +16,8 @@ exerted : tuple of 5 floats
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import (
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import (
     first_true_lane,
     lane_sqrt,
     lane_sum,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import lane_sum, max_of_lanes, select_lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import lane_sum, max_of_lanes, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.one_contact import is_warm_start_valid
 from physics.kernels.contact_solver.patch import patch_coordinates_along

@@ -28,8 +28,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sqrt, lane_sum, larger, max_of_lanes, select_lanes
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import Lanes, first_true_lane, lane_sqrt, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.contact_solver.one_contact import inverse_root
 from physics.kernels.contact_solver.patch import PatchFriction
 from physics.kernels.contact_solver.patch_algebra import (

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import scale_by_compliance
 from physics.kernels.contact_solver.gauss_seidel import LOCAL_NORMAL_RHO, cone_residual, update_contact_velocities
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
 from physics.kernels.contact_solver.contact_pair import contact_in_wall_frame
 from physics.kernels.contact_solver.one_contact import FreeBody, motion_in_wall_frame, wall_to_world

@@ -41,8 +41,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes, first_true_lane, lane_sum, larger, max_of_lanes, select_lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import Lanes, first_true_lane, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.contact_solver.contact_pair import contact_in_wall_frame
 from physics.kernels.contact_solver.patch_algebra import (
     fit_normal_motion,

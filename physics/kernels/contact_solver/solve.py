@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import if_given, inlined, kernel, shared_kernel
-from physics.kernels.compile.simd import LANE_COUNT
+from physics.compiler.decorators import if_given, inlined, kernel, shared_kernel
+from physics.compiler.simd import LANE_COUNT
 from physics.kernels.contact_law.anisotropic_friction import stretch_tangents, unstretch_tangents
 from physics.kernels.contact_law.compliance import add_delassus_compliance, contact_stiffness
 from physics.kernels.contact_solver.friction_pyramid import solve_normal_lcp, solve_pyramid_lcp

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_law.compliance import add_block_compliance
 from physics.kernels.contact_solver.contact_pair import (

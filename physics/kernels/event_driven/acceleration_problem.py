@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_solver.sliding_patch import TRY_STICKING
 from physics.kernels.event_driven.contact_candidates import (
     CANDIDATE_OPEN,

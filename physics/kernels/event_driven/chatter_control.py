@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.event_driven.guards import FORCE_GUARDS
 from physics.kernels.event_driven.mode_acceptance import NO_MODE, contact_mode_hash, distrust_force_guards
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_forces import (
     apply_inverse_inertia,
     assemble_unknowns,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.constraint_projection import project_normal_speeds
 from physics.kernels.event_driven.extrapolated_midpoint import put_state_row
 from physics.kernels.event_driven.guards import compute_feature_gaps

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import sliding_direction
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt

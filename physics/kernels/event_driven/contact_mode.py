@@ -13,7 +13,7 @@ applies an impulse.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.event_driven.acceleration_problem import set_up_resting_problem
 from physics.kernels.event_driven.contact_candidates import (
     MODE_CONTACT,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import unstretch_force
 from physics.kernels.event_driven.contact_candidates import (
     CANDIDATE_OPEN,

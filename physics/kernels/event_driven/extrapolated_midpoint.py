@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_forces import free_angular_motion, set_contact_kinematics
 from physics.kernels.event_driven.force_system import solve_mode_forces
 from physics.kernels.event_driven.slip_onset import (

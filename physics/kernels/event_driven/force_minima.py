@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_forces import recover_contact_forces
 from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rate
 from physics.kernels.event_driven.guards import FORCE_MARGIN_TOLERANCE, cone_excess

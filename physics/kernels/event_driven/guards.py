@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import unstretch_force
 from physics.kernels.event_driven.contact_forces import NO_PATCH, free_angular_motion, recover_contact_forces
 from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rate, get_state_row, sliding_velocity

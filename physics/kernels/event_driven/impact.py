@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, limit_rebound_energy
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING
 from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts

@@ -9,7 +9,7 @@ back and shortened.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_candidates import (
     MODE_CONTACT,
     MODE_REST,

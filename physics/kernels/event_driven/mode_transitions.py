@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.half_space.contact_point import wall_of
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_HEAD
 from physics.kernels.time_stepping import event_log as ev

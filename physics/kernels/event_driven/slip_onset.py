@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_forces import apply_inverse_inertia, sliding_force_direction
 from physics.kernels.event_driven.workspace import Y_ANGULAR_MOMENTUM, Y_VELOCITY
 from physics.kernels.half_space.contact_point import wall_axes, wall_normal, wall_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.constraint_projection import project_state
 from physics.kernels.event_driven.contact_candidates import project_candidate_speeds
 from physics.kernels.event_driven.contact_forces import free_angular_motion, store_last_forces

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import if_given, inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.event_driven.acceleration_problem import read_resting_mode
 from physics.kernels.event_driven.chatter_control import (

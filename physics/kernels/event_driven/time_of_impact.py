@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.event_driven.contact_forces import free_angular_motion
 from physics.kernels.event_driven.extrapolated_midpoint import (
     SEGMENT_SHORTEST_STEP,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import if_given, inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.flight import integrators
 from physics.kernels.flight.free_rotation import free_rotation, isotropic_rotation
 from physics.kernels.math.vector import as_vector

@@ -53,7 +53,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 
 # Largest rotation angle of one part [rad]. The first neglected terms are of relative size θ⁸ times at most

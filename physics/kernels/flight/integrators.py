@@ -51,7 +51,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.math.quaternion import cross, matvec, multiply, normalise, to_matrix, transposed_matvec
 
 # Codes of `step` and `integrate`. 0 is reserved for the exact flow, which stands elsewhere.

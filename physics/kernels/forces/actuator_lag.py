@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import entry_kernel, inlined
+from physics.compiler.decorators import entry_kernel, inlined
 
 
 @inlined

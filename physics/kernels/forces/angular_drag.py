@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.forces.implicit_loads import implicit_share
 from physics.kernels.math import quaternion as qt

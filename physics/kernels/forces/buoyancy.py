@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.forces.force_field_state import ZERO, acting_at
 from physics.kernels.forces.implicit_loads import soften_at
 from physics.kernels.forces.submerged_volume import submerged_part

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.forces.force_field_state import acting_at, velocity_at
 from physics.kernels.forces.implicit_loads import (
     arm_frequency_squared,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import (
     if_declared,

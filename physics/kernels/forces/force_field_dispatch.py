@@ -5,7 +5,7 @@ three columns. Numba compiles a kernel per type of its arguments, so that a reco
 fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
 with a digest of its source: an edit is another type.
 
-What is compiled is chosen by the type of the record (`compile.decorators.by_type`), and nothing is passed for it.
+Its kernel is chosen by the type of the record (`physics.compiler.decorators.by_type`), and nothing is passed for it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from physics.kernels.compile.decorators import by_type, members, runtime_kernel, when
+from physics.compiler.decorators import by_type, members, runtime_kernel, when
 from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math.quaternion import dot
 from physics.kernels.math.vector import plus

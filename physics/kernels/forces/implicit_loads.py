@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import apply_inv_inertia

@@ -5,7 +5,7 @@ Also where the columns of such a spring stand, and the state of a body in the mi
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.field_loads import (
     acting_loads,
     add_held_loads,

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import entry_kernel
+from physics.compiler.decorators import entry_kernel
 from physics.kernels.forces.field_loads import field_state
 from physics.kernels.forces.force_field_dispatch import total_energy, total_load
 from physics.kernels.forces.held_loads import bind_fields

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import (
     add_held_loads,

@@ -8,7 +8,7 @@ of the step, by an implicit step, when the velocity is negligible.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.flight.free_flight import integrate_flight
 from physics.kernels.forces.energy_budget import limit_energy_gain
 from physics.kernels.forces.field_loads import acting_loads, apply_total_loads, load_bound

@@ -8,7 +8,7 @@ line of the two points, momentum and angular momentum of the two together are ke
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import backend, by_type, inlined, kernel
+from physics.compiler.decorators import backend, by_type, inlined, kernel
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.forces.field_loads import apply_loads, field_load
 from physics.kernels.forces.force_field_dispatch import LOAD, iterate_terms

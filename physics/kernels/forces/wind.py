@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 
 WIND_WAVES = 8  # N
 

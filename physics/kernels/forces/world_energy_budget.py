@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.energy_budget import (
     ENERGY_ROUNDING,
     UNRESOLVED_GAIN_SHARE,

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.flight.free_flight import fly
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.half_space.contact_point import center_arm, wall_normal

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import BLOCK, SPHERE, WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2

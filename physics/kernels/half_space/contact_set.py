@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import LANE_COUNT, store_lanes
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import LANE_COUNT, store_lanes
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.half_space.contact_point import center_arm, feature_of, geometric_center, wall_normal, wall_of
 from physics.kernels.half_space.persistent_contacts import is_still_pressed, last_normal_impulse, turning_acceleration

@@ -8,7 +8,7 @@ left it nor hit it.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, place_arms, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import angular_velocity, apply_inv_inertia, principal_attitude

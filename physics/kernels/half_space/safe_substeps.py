@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.forces.held_loads import has_fields
 from physics.kernels.half_space.contact_point import wall_normal
 from physics.kernels.half_space.contact_set import is_flight_clear

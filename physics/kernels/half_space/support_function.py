@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import Lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import BLOCK, SPHERE, VERTEX_COUNT
 

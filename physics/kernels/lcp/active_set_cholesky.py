@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 
 DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur complement is dependent
 

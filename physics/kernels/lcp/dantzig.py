@@ -35,7 +35,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.lcp.active_set_cholesky import DEPENDENT_TOLERANCE, clamp_index, release_index, solve_clamped
 from physics.kernels.lcp.scaling_and_certificate import (
     LCP_BAD_DATA,

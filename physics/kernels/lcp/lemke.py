@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.lcp.scaling_and_certificate import (
     LCP_BAD_DATA,
     LCP_PIVOT_LIMIT,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 
 # Statuses, the same for every pivoting solver.
 LCP_SOLVED = 0

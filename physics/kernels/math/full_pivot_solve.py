@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 
 # A pivot below this share of the largest one is none: the rows left then say the same twice.
 PIVOT_SHARE = 1.0e-10

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 
 
 @inlined

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import Lanes
 
 
 @inlined

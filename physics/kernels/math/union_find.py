@@ -5,7 +5,7 @@ Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorith
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 
 
 @inlined

@@ -5,7 +5,7 @@ Where the compiler has none, each thread has a table of its own (`physics.parall
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import backend, inlined
+from physics.compiler.decorators import backend, inlined
 
 
 @inlined

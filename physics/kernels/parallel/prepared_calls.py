@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.fused.prepared_calls import JOB_BYTES, enter_prepared, raise_prepared
+from physics.compiler.decorators import kernel
+from physics.compiler.fused.prepared_calls import JOB_BYTES, enter_prepared, raise_prepared
 
 
 @kernel

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.fused.atomics import (
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.fused.atomics import (
     atomic_add,
     atomic_exchange,
     atomic_load,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel, lend
+from physics.compiler.decorators import inlined, kernel, lend
 from physics.kernels.parallel.atomics import atomic_add
 
 # Words between what different threads change: two lines of a cache, since processors fetch them in pairs.

@@ -7,7 +7,7 @@ workspace. Where none is declared nothing of it is compiled, stored or passed on
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import by_type, members, when
+from physics.compiler.decorators import by_type, members, when
 
 # Names of the laws, in the order of their numbers in `work.laws` and of their columns, the last of `params`.
 LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
-from physics.kernels.compile.simd import LANE_COUNT, Lanes, lane_sum, load_lanes, store_lanes
+from physics.compiler.decorators import kernel
+from physics.compiler.simd import LANE_COUNT, Lanes, lane_sum, load_lanes, store_lanes
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Arguments of a step that travel together, as named tuples: switches, arrays of bodies, records of a step.
 
 A switch is None (off) or not (on). Which of two functions is called, or which of two answers given, is chosen by its
-type (`physics.kernels.compile.decorators.if_given`).
+type (`physics.compiler.decorators.if_given`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import if_given
+from physics.compiler.decorators import if_given
 
 
 class WorkQueue(NamedTuple):

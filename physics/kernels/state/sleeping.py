@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 
 # Columns of a body's row; all zero: awake, and nothing known of it yet.
 SLEEP_GROUP = 0  # 0: awake; else the first body of those that sleep and wake together, + 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.restitution_energy import (
     IMPACT_ENERGY_ROUNDING,
     limit_rebound_energy,

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import if_given, inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.half_space.contact_point import contact_arm, wall_of

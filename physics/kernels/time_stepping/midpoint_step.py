@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import if_given, inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.contact_law.compliance import (
     predict_end_gaps,
     set_spring_targets,

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
 from physics.kernels.half_space.contact_point import wall_normal, wall_of
 from physics.kernels.math import quaternion as qt

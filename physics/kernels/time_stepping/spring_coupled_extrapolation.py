@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.field_loads import field_load
 from physics.kernels.forces.implicit_two_body_spring import read_middle, write_middle
 from physics.kernels.forces.two_body_spring import place_anchors

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.flight.free_flight import integrate_flight
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.forces.held_loads import bind_fields, set_clock

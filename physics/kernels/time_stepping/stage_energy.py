@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
 from physics.kernels.contact_law.restitution_energy import scale_impulses_to_dissipate
 from physics.kernels.contact_solver.one_contact import point_velocity

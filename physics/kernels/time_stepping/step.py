@@ -30,7 +30,7 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import cold_kernel, if_given, inlined, kernel
+from physics.compiler.decorators import cold_kernel, if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.contact_solver.solve import rows_per_contact

@@ -11,7 +11,7 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.half_space.contact_point import wall_axis, wall_of
 from physics.kernels.math import quaternion as qt

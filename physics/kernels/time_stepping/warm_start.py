@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import cold_kernel, inlined, kernel
+from physics.compiler.decorators import cold_kernel, inlined, kernel
 from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WALL_MEMORY_HEAD, WALL_MEMORY_STAGE
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.multibody.data.arrays import ENTRIES_PER_BODY
 
 # Width of a strip in mean widths of a box: a box then enters about (1 + 1/2)² columns.

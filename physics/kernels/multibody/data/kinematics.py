@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.half_space.contact_point import geometric_center
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector

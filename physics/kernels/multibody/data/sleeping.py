@@ -7,7 +7,7 @@ found by the broad phase first, and wakes the group before contacts are searched
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.two_body_spring import unite_linked_bodies
 from physics.kernels.math.union_find import find_root, unite_sets
 from physics.kernels.multibody.data.arrays import NUM_PAIRS

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import shared_kernel
+from physics.compiler.decorators import shared_kernel
 from physics.kernels.multibody.broadphase.sweep_and_prune import (
     find_pairs,
     may_meet,

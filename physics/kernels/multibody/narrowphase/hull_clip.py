@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, subtract

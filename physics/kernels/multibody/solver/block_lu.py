@@ -16,8 +16,8 @@ Reference: A. George, J. W.-H. Liu, *Computer Solution of Large Sparse Positive 
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, larger, load_lanes, max_of_lanes, select_lanes, store_lanes
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import Lanes, larger, load_lanes, max_of_lanes, select_lanes, store_lanes
 from physics.kernels.multibody.data.arrays import BLOCK_SIZE, COLUMN_SIZE
 
 TWIST_DOFS = 6  # of a block: velocity and angular velocity of a body

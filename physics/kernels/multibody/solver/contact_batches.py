@@ -10,8 +10,8 @@ batch is `many.newton.lanes[g, 4 f : 4 f + 4]`.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import (
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import (
     LANE_COUNT,
     Lanes,
     lane_sqrt,

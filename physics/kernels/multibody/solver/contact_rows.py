@@ -10,7 +10,7 @@ and v_a changes by f/m_a with f = Eᵀ p, ω_a by I_a⁻¹ (r x f), those of b b
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
+from physics.compiler.decorators import inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract

@@ -10,7 +10,7 @@ tolerance. The returned impulses are checked whole.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_solver.one_contact import CONTACT_UNSOLVED, friction_direction, solve_contact_block
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector

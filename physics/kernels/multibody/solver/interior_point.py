@@ -27,8 +27,8 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, lane_sum, larger, max_of_lanes, select_lanes
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import Lanes, lane_sum, larger, max_of_lanes, select_lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.multibody.data.arrays import COLUMN_SIZE, NUM_BATCHES
 from physics.kernels.multibody.data.contact_set import add_scaled

@@ -8,7 +8,7 @@ Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorith
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math.union_find import find_root, unite_sets
 
 

@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 
 _NO_ENTRY = -1
 

@@ -14,7 +14,7 @@ nothing is: goals are next to rounding there, and a high arch at its limit, swep
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import PRE_LOAD_VELOCITY
 from physics.kernels.multibody.data.contact_set import subtract

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
-from physics.kernels.compile.simd import Lanes, lane_sums, larger, load_lanes, select_lanes, store_lanes
+from physics.compiler.decorators import inlined, kernel
+from physics.compiler.simd import Lanes, lane_sums, larger, load_lanes, select_lanes, store_lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import BLOCK_SIZE, COLUMN_SIZE, NUM_BATCHES

@@ -12,8 +12,8 @@ each time, since what is not a number in one world would stay there for all that
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import Lanes, lane_sum, load_lanes, store_lanes
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import Lanes, lane_sum, load_lanes, store_lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector

@@ -17,7 +17,7 @@ thrown away and ρ shrinks.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import COLUMN_SIZE, NUM_BATCHES
 from physics.kernels.multibody.data.contact_set import put_vector

@@ -14,8 +14,8 @@ References
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined
-from physics.kernels.compile.simd import lane_sqrt
+from physics.compiler.decorators import inlined
+from physics.compiler.simd import lane_sqrt
 from physics.kernels.math import quaternion as qt
 
 

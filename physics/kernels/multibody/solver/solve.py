@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.compiler.decorators import inlined, kernel, shared_kernel
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import TWIST_DOFS

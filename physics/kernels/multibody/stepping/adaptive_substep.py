@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import set_clock
 from physics.kernels.multibody.data.arrays import WARM_CONTACT_COUNT, WARM_CONTACT_SIZE, WARM_HEADER_SIZE
 from physics.kernels.multibody.data.contact_set import subtract

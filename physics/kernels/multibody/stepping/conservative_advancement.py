@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.flight.free_flight import fly
 from physics.kernels.half_space.conservative_advancement import (
     CHORDS,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import kernel
+from physics.compiler.decorators import kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.target_velocity import (
     GAP_CLOSING_SHARE,
     MAX_TARGET_TURN,

@@ -13,7 +13,7 @@ stands out by less than that is no obstacle.
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.compiler.decorators import inlined, kernel, shared_kernel
 from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt

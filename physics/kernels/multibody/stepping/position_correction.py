@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel, shared_kernel
+from physics.compiler.decorators import inlined, kernel, shared_kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.union_find import find_root
 from physics.kernels.math.vector import row_vector

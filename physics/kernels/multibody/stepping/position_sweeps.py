@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.gauss_seidel import is_contact_up_to_date, relax_normal_impulse
 from physics.kernels.multibody.solver.normal_rows import assemble_normal_row, body_twist_from_motion, put_padded

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, rebound_share
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import PARTED, add_scaled, put_vector, row_matrix, subtract

@@ -9,7 +9,7 @@ for the broad phase, until something wakes it (`sleep`).
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector

@@ -23,7 +23,7 @@ No body passes through another one, however fast: a speculative contact bounds t
 
 from __future__ import annotations
 
-from physics.kernels.compile.decorators import inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH

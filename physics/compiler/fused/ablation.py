@@ -1,0 +1,80 @@
+"""Switches of the optimisations of this compiler; each can be turned off to measure its worth.
+
+The environment variable ``RIGID_ENV_WITHOUT=ranges,scalars`` leaves out these two; it is read once, on import. Numba's
+own way takes the place of each, and results differ in rounding at most. ``python -m benchmarks.ablation`` measures them
+in turns. Machine code made without one is kept in a folder of its own (`cache_folder.folder_name`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+
+VARIABLE = "RIGID_ENV_WITHOUT"
+
+# By name; one that is named after a module is all of that module.
+OPTIMISATIONS = {
+    "argument_passing": "large tuples are handed on by address, not word by word",
+    "array_elements": "elements of arrays are read and written directly, not by way of a copy of the array's words",
+    "cold_kernels": "a call is left of what a step hardly ever needs",
+    "folding_builder": "members of structures and constants are folded while instructions are written",
+    "fused_products": "a product in a sum is rounded with it; the last bits of results depend on it",
+    "indices_from_front": "no index is asked whether it is negative",
+    "inlined_kernels": "no call is left of what is a few instructions long",
+    "lowering": "a variable that is assigned once is a value without memory; none is read or cleared to release it",
+    "memoised_contexts": "types and lowerings of operations and sizes of types are determined once",
+    "passes": "a kernel goes through the passes that it needs, not through all of Numba's",
+    "paused_gc": "the garbage collector waits while kernels are compiled",
+    "ranges": "loops count without asking whether the step is zero",
+    "scalars": "max, min, int and powers of numbers are written in place, not compiled as functions",
+    "shared_kernels": "large kernels that know no plan are made machine code once for all plans",
+    "simd_types": "an operation on lanes is one of vectors, not one for each lane",
+    "type_inference": "a constraint is looked at again only if a type in it has changed",
+    "untimed_parts": "no clocks run while a part is compiled",
+}
+
+# Modules without a switch, and the reason.
+BASES = {
+    "atomics": "instructions by which threads share worlds",
+    "backend": "the interface of the decorators",
+    "calling_convention": "the short way to hand an exception on; `user_functions` rests on the line that it names",
+    "cache_files": "files of machine code: no optimisation, and all that is kept on disk rests on it",
+    "code_libraries": "without it each caller optimises its parts once more: a first compile takes 2.8 times as long",
+    "disk_cache": "what is kept on disk and loaded: shared kernels rest on it; `benchmarks.start` shows its worth",
+    "dispatcher": "has kernels compiled: all others hook in there",
+    "operation_table": "asks `array_elements`, `ranges`, `scalars` and `simd_types`, which have switches",
+    "prepared_calls": "makes the calls that `prepared_entry` is the other end of",
+    "prepared_entry": "threads take their calls from a table of prepared ones, and chained calls stand in it",
+    "user_functions": "looks through users' functions before anything moves",
+}
+
+
+def read_names(text: str) -> frozenset[str]:
+    """Names of optimisations in the value of `VARIABLE`.
+
+    Raises
+    ------
+    ValueError
+        One of them is unknown.
+    """
+    names = frozenset(filter(None, (each.strip() for each in text.split(","))))
+    if names <= OPTIMISATIONS.keys():
+        return names
+    unknown = ", ".join(sorted(names - OPTIMISATIONS.keys()))
+    raise ValueError(f"{VARIABLE}={text!r} names {unknown}; allowed are {', '.join(OPTIMISATIONS)}")
+
+
+WITHOUT = read_names(os.environ.get(VARIABLE, ""))
+
+
+def is_on(name: str) -> bool:
+    """True unless an optimisation, one of `OPTIMISATIONS`, is turned off."""
+    if name not in OPTIMISATIONS:
+        raise KeyError(name)
+    return name not in WITHOUT
+
+
+def folder_suffix() -> str:
+    """Suffix of the folder of machine code that names the optimisations turned off; empty if all are on."""
+    names = ",".join(sorted(WITHOUT))
+    return f"-without-{hashlib.sha256(names.encode()).hexdigest()[:8]}" if names else ""

@@ -1,0 +1,159 @@
+"""Elements of arrays, and arrays of records, in as few instructions as possible.
+
+Numba lowers elements through memory. To read `a[i, j]` it copies the array's seven words, reads shapes and strides from
+the copy, and multiplies these even for an array of known size. The optimiser removes all of it; here it is not written
+in the first place. All other cases are left to Numba.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+
+from llvmlite import ir
+from numba.core import cgutils, types, typing
+
+from physics.compiler.fused.ablation import is_on
+from physics.compiler.fused.folding_builder import (
+    NO_SIGNED_WRAP,
+    KernelBuilder,
+    known_integer,
+    make_struct,
+    word_constant,
+)
+
+_ITEM_SIZE, _DATA, _SHAPE, _STRIDES = 3, 4, 5, 6  # members of an array
+
+_COUNTS_FROM_FRONT = is_on("indices_from_front")
+
+
+def _lengths(builder, array_type, array, member, known) -> list:
+    """Shape or strides [bytes] of an array, as constants if its type has them."""
+    if isinstance(array_type, types.NestedArray):
+        return [word_constant(length) for length in known(array_type)]
+    return [builder.extract_value(array, (member, axis)) for axis in range(array_type.ndim)]
+
+
+def _from_front(context, builder, index, type_, length):
+    """Index as a word, counted from the front of an axis.
+
+    In kernels only a literal counts from the end: to ask of each index whether it is negative takes 6 % of a heap's
+    time. Functions of users, which are not written with our builder, may count as they like.
+    """
+    index = context.cast(builder, index, type_, types.intp if type_.signed else types.uintp)
+    known = known_integer(index)
+    is_from_front = known >= 0 if known is not None else _COUNTS_FROM_FRONT and isinstance(builder, KernelBuilder)
+    if is_from_front or not type_.signed:
+        return index
+    return builder.select(builder.icmp_signed("<", index, word_constant(0)), builder.add(index, length), index)
+
+
+def element_pointer(context, builder, array_type, array, index_types, indices):
+    """Pointer to an element; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
+    shape = _lengths(builder, array_type, array, _SHAPE, lambda known: known.shape)
+    data = builder.extract_value(array, _DATA)
+    from_front = []
+    for axis, (index, type_, length) in enumerate(zip(indices, index_types, shape, strict=True)):
+        from_front.append(_from_front(context, builder, index, type_, length))
+        if context.enable_boundscheck:
+            cgutils.do_boundscheck(context, builder, from_front[axis], length, axis)
+    if array_type.layout == "C":
+        place = from_front[0]
+        for index, length in zip(from_front[1:], shape[1:], strict=True):
+            place = builder.add(builder.mul(place, length, flags=NO_SIGNED_WRAP), index, flags=NO_SIGNED_WRAP)
+        return builder.gep(data, [place], inbounds=True)
+    strides = _lengths(builder, array_type, array, _STRIDES, lambda known: known.strides)
+    offset = word_constant(0)
+    for index, stride in zip(from_front, strides, strict=True):
+        offset = builder.add(offset, builder.mul(index, stride))
+    return cgutils.pointer_add(builder, data, offset)
+
+
+def _indices(builder, index_type, index) -> tuple[tuple, list]:
+    """Types and values of the indices in `a[index]`."""
+    if isinstance(index_type, types.BaseTuple):
+        return tuple(index_type.types), [builder.extract_value(index, k) for k in range(len(index_type))]
+    return (index_type,), [index]
+
+
+def _is_element(array_type, index_type) -> bool:
+    """True if `a[index]` is one element, not a view, by the types of array and index."""
+    if not isinstance(array_type, types.Array) or array_type.layout not in "CA":
+        return False
+    each = index_type.types if isinstance(index_type, types.BaseTuple) else (index_type,)
+    return len(each) == array_type.ndim and all(isinstance(one, types.Integer) for one in each)
+
+
+def _read(context, builder, sig, args):
+    """`a[index]`."""
+    place = element_pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
+    return context.unpack_value(builder, sig.args[0].dtype, place, None if sig.args[0].aligned else 1)
+
+
+def _write(context, builder, sig, args):
+    """`a[index] = value`."""
+    array_type, index_type, value_type = sig.args
+    value = context.cast(builder, args[2], value_type, array_type.dtype)
+    place = element_pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
+    context.pack_value(builder, array_type.dtype, value, place, None if array_type.aligned else 1)
+
+
+def _reshape(context, builder, sig, args):
+    """`a.reshape(shape)` of a contiguous array to as many elements; NUMBA_BOUNDSCHECK=1 checks the sizes."""
+    if context.enable_boundscheck or not isinstance(builder, KernelBuilder):
+        return NotImplemented
+    array, shape = args
+    model = context.get_value_type(sig.return_type)
+    lengths = [builder.extract_value(shape, k) for k in range(sig.return_type.ndim)]
+    strides = [builder.extract_value(array, _ITEM_SIZE)]
+    for length in reversed(lengths[1:]):
+        strides.insert(0, builder.mul(strides[0], length, flags=NO_SIGNED_WRAP))
+    kept = [builder.extract_value(array, k) for k in range(_SHAPE)]
+    axes = [make_struct(builder, model.elements[_SHAPE], each) for each in (lengths, strides)]
+    return make_struct(builder, model, [*kept, *axes])
+
+
+def array_in_record(context, builder, record_type, record, name):
+    """Array in a field of a record: all of it is a constant, except its address."""
+    field = record_type.typeof(name)
+    data = cgutils.get_record_member(
+        builder, record, record_type.offset(name), context.get_data_type(field.dtype)
+    )  # fmt: skip
+    model = context.get_value_type(field)
+    lengths = [
+        ir.Constant.literal_array([word_constant(each) for each in axes]) for axes in (field.shape, field.strides)
+    ]
+    owner = [ir.Constant(each, None) for each in model.elements[:2]]
+    return make_struct(
+        builder, model, [*owner, word_constant(math.prod(field.shape)), word_constant(field.size), data, *lengths]
+    )
+
+
+def signature(key, context, args) -> typing.Signature | None:
+    """Signature of `a[index]` or `a[index] = number` for an element, or None."""
+    if key is operator.getitem and _is_element(*args):
+        return typing.signature(args[0].dtype, args[0], _as_words(args[1]))
+    if key is operator.setitem and _is_element(*args[:2]) and args[0].mutable:
+        value = types.unliteral(args[2])
+        if isinstance(value, types.Number) and isinstance(args[0].dtype, types.Number):
+            return typing.signature(types.none, args[0], _as_words(args[1]), value)
+    return None
+
+
+def _as_words(index: types.Type) -> types.Type:
+    """Type of an index with all of its numbers as words."""
+    if isinstance(index, types.BaseTuple):
+        return types.BaseTuple.from_types(tuple(map(_as_words, index.types)))
+    return types.intp if index.signed else types.uintp
+
+
+def lowering(key, sig: typing.Signature) -> Callable | None:
+    """Return the function that lowers an element, or a reshaped array."""
+    if key is operator.getitem and _is_element(*sig.args):
+        return _read
+    if key is operator.setitem and _is_element(*sig.args[:2]):
+        return _write
+    if key == "array.reshape" and sig.recvr.layout == "C" and len(sig.args) == 1:
+        return _reshape if isinstance(sig.args[0], types.UniTuple) else None
+    return None

@@ -1,0 +1,161 @@
+"""Machine code of wholes and shared kernels on disk (`dispatcher`).
+
+A file names the shared kernels that its code calls; they are loaded before it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import sys
+from functools import cache, cached_property
+from pathlib import Path
+
+import numba
+from numba import _dynfunc
+from numba.core.compiler import CompileResult, compile_result
+from numba.core.environment import Environment
+from numba.core.serialize import dumps
+
+from physics.compiler.cache_folder import is_owned_by_user
+from physics.compiler.fused import cache_files
+from physics.compiler.fused.code_libraries import SharedLibrary
+from physics.compiler.notices import warn, warn_once
+
+
+class _Cache:
+    """Machine codes of one kernel on disk, in place of Numba's cache.
+
+    Parameters
+    ----------
+    function : Callable
+    folder : Path or None
+        None: nothing is kept.
+    """
+
+    kind = ""
+
+    def __init__(self, function, folder: Path | None):
+        self._function, self._source = function, Path(inspect.getfile(function))
+        self.cache_path = folder
+        self._is_enabled = folder is not None and self._source.exists()  # else it was typed in
+
+    def enable(self):
+        """Use the disk."""
+        self._is_enabled = self.cache_path is not None and self._source.exists()
+
+    def disable(self):
+        """Stop using the disk."""
+        self._is_enabled = False
+
+    def flush(self):
+        """Drop everything kept of this kernel."""
+        for path in self.cache_path.glob(f"{self._name}.*.nbc") if self._is_enabled else ():
+            path.unlink(missing_ok=True)
+
+    def load_overload(self, sig, target_context):
+        """Machine code for the types `sig` of arguments; None without a usable one.
+
+        Numba refreshes its context first: that fills it with all it can compile, for which SciPy is imported, and takes
+        four times as long as to read a step. Machine code needs none of it, as kernels have no run time of Numba
+        (`_nrt` of `backend`). Where a kernel is compiled after all, `CompilerBase` refreshes the context.
+        """
+        if not self._is_enabled:
+            return None
+        path, purpose = self._place(sig, target_context.codegen())
+        try:
+            payload = cache_files.read_cache_file(path, purpose)
+            return None if payload is None else self.rebuild(target_context, payload)
+        except cache_files.ForeignFileError as reason:
+            warn_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
+        except Exception as error:  # whatever is wrong with it, the kernel can be compiled
+            warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
+        return None
+
+    def save_overload(self, sig, made):
+        """Keep machine code, if that is possible."""
+        if not self._is_enabled or made.library.has_dynamic_globals:
+            return
+        path, purpose = self._place(sig, made.codegen)
+        if path.is_file() and not is_owned_by_user(path.stat()):
+            return  # somebody else's, who would find it changed
+        try:
+            cache_files.write_cache_file(path, purpose, dumps(self.reduce(made)))
+        except OSError as error:
+            about = (
+                f"kernels cannot be kept in {self.cache_path} ({error.strerror or error}): each process compiles them"
+            )
+            warn_once("unwritable", about)
+
+    @cached_property
+    def _name(self) -> str:
+        name = f"{self._source.stem}.{self._function.__qualname__}".replace("<", "").replace(">", "")
+        return f"{name}-{self._function.__code__.co_firstlineno}{self.kind}"
+
+    @cached_property
+    def _about(self) -> bytes:
+        """Return the settings, besides argument types and processor, on which machine code depends."""
+        function = self._function
+        around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
+        versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
+        parts = (repr(versions).encode(), str(self._source.resolve()).encode(), self._name.encode(),
+                 _digest_of_file(self._source), function.__code__.co_code, around)  # fmt: skip
+        return b"".join(hashlib.sha256(part).digest() for part in parts)
+
+    def _place(self, sig, codegen) -> tuple[Path, bytes]:
+        """File of machine code, and its purpose."""
+        purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
+        return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
+
+
+@cache
+def _digest_of_file(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
+
+
+class WholeCache(_Cache):
+    """Cache of the wholes of one kernel: each with its shared kernels, and Numba's data."""
+
+    def reduce(self, made):
+        """Return the content of the file."""
+        return made.library.called, made._reduce()
+
+    def rebuild(self, target_context, payload):
+        """Make the whole from the content of its file."""
+        called, kept = payload
+        for origin in called:
+            origin.load()
+        return CompileResult._rebuild(target_context, *kept)
+
+
+class SharedCache(_Cache):
+    """Cache of a shared kernel's machine codes, without IR, since nothing is linked with it."""
+
+    kind = "-standing"  # its file is not that of the whole of the same kernel
+
+    def reduce(self, made):
+        """Return the content of the file."""
+        library, about = made.library, made.fndesc
+        code = library.machine_code()
+        about.typemap = about.calltypes = None
+        return library.called, library.origin, code, about, made.signature
+
+    def rebuild(self, target_context, payload):
+        """Make the kernel from the content of its file."""
+        called, origin, code, about, signature = payload
+        for each in called:
+            each.load()
+        library = SharedLibrary(target_context.codegen(), about.qualname)
+        library.called, library.origin = called, origin
+        library.take(code)
+        return compile_result(
+            target_context=target_context, fndesc=about, library=library, signature=signature, objectmode=False,
+            entry_point=register_library(target_context, about, Environment.from_fndesc(about), library),
+        )  # fmt: skip
+
+
+def register_library(target_context, about, environment, library):
+    """Register a kernel with Numba, which identifies functions by entry points, under one that must not be called."""
+    entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
+    target_context.insert_user_function(entry, about, [library])
+    return entry

@@ -1,0 +1,252 @@
+"""Builder of a kernel's instructions that folds those with known results.
+
+Numba passes structures on (an array is one of seven words). It inserts a word, extracts another, and leaves it to LLVM
+to find out that nothing happened. Writing, reading and removing such instructions was most of the compile time of a
+kernel.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import cgutils
+
+from physics.compiler.fused.ablation import is_on
+
+WORD = ir.IntType(64)
+NO_SIGNED_WRAP = ("nsw",)  # no index and no number of a range is beyond what a word holds
+
+
+def _position(indices) -> tuple[int, ...]:
+    return (indices,) if isinstance(indices, int) else tuple(indices)
+
+
+class StructInMemory:
+    """Structure in read-only memory of which nothing has been read yet.
+
+    Parameters
+    ----------
+    address : llvmlite.ir.Value
+        Pointer to it.
+    """
+
+    def __init__(self, address):
+        self.address = address
+        self.type = address.type.pointee
+        self._members: dict[int, StructInMemory | ir.Value] = {}
+
+    def member(self, builder: ir.IRBuilder, k: int):
+        """Member of the structure, read once at the entry of the function unless it is a structure itself."""
+        if k not in self._members:
+            with builder.goto_entry_block():
+                address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
+                is_word = not isinstance(address.type.pointee, ir.Aggregate)
+                self._members[k] = builder.load(address) if is_word else StructInMemory(address)
+        return self._members[k]
+
+    def read(self, builder: ir.IRBuilder):
+        """Whole structure as a value."""
+        return ir.IRBuilder.load(builder, self.address)
+
+
+def member_type(type_: ir.Type, k: int) -> ir.Type:
+    """Type of a member of a structure."""
+    return type_.gep(ir.Constant(ir.IntType(32), k))
+
+
+class StructByMembers:
+    """Structure known by its members; it is built as one value only where all of it is needed.
+
+    Parameters
+    ----------
+    type_ : llvmlite.ir.Type
+    members : sequence
+        Of values, structures, and None for what is not defined.
+    """
+
+    def __init__(self, type_: ir.Type, members):
+        self.type = type_
+        self._members = tuple(members)
+
+    def member(self, builder: ir.IRBuilder, k: int):
+        """Member of the structure."""
+        return ir.Constant(member_type(self.type, k), ir.Undefined) if self._members[k] is None else self._members[k]
+
+    def changed(self, builder: ir.IRBuilder, value, position: tuple[int, ...]):
+        """Structure with one member, or member of a member, replaced."""
+        k, *within = position
+        if within:
+            value = builder.insert_value(self.member(builder, k), value, within)
+        return StructByMembers(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
+
+    def read(self, builder: ir.IRBuilder):
+        """Whole structure as a value."""
+        members = [_as_value(builder, self.member(builder, k)) for k in range(len(self._members))]
+        whole = ir.Constant(self.type, [m if _is_constant(m) else ir.Constant(m.type, ir.Undefined) for m in members])
+        for k, member in enumerate(members):
+            if not _is_constant(member):
+                whole = ir.IRBuilder.insert_value(builder, whole, member, k)
+        return whole
+
+
+def make_struct(builder: ir.IRBuilder, type_: ir.Type, members):
+    """Make a structure of these members, for our builder or Numba's."""
+    structure = StructByMembers(type_, members)
+    return structure if isinstance(builder, FoldingBuilder) else structure.read(builder)
+
+
+def _is_constant(value) -> bool:
+    return isinstance(value, ir.Constant)
+
+
+def _split_constant(value):
+    """Members of a constant structure; anything else as it is."""
+    if not _is_constant(value) or not isinstance(value.type, ir.Aggregate):
+        return value
+    known = value.constant if isinstance(value.constant, (list, tuple)) else None
+    if known is None and value.constant is not ir.Undefined:
+        return value
+    return StructByMembers(value.type, known or [None] * len(value.type))
+
+
+class KernelBuilder(ir.IRBuilder):
+    """LLVM's builder, with `fused_multiply_add`."""
+
+    if is_on("fused_products"):
+
+        def fadd(self, lhs, rhs, name="", flags=()):
+            """Sum of numbers, or of lanes. A product in it is `fused_multiply_add`, of two the second."""
+            left, right = _factors(lhs), _factors(rhs)
+            if right:
+                return fused_multiply_add(self, *right, lhs)
+            return fused_multiply_add(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
+
+        def fsub(self, lhs, rhs, name="", flags=()):
+            """Difference of numbers, or of lanes: one product is fused; of two none, so that equal ones leave 0."""
+            left, right = _factors(lhs), _factors(rhs)
+            if bool(left) == bool(right):
+                return super().fsub(lhs, rhs, name, flags)
+            return (
+                fused_multiply_add(self, self.fneg(right[0]), right[1], lhs)
+                if right
+                else fused_multiply_add(self, *left, self.fneg(rhs))
+            )
+
+
+class FoldingBuilder(KernelBuilder):
+    """`KernelBuilder` with structures known by their members, and constants folded."""
+
+    def extract_value(self, agg, idx, name=""):
+        """Member of a structure: the value that was inserted, if that is known."""
+        position = _position(idx)
+        agg = _split_constant(agg)
+        while position and isinstance(agg, (StructInMemory, StructByMembers)):
+            agg, position = _split_constant(agg.member(self, position[0])), position[1:]
+        return super().extract_value(agg, position, name) if position else agg
+
+    def insert_value(self, agg, value, idx, name=""):
+        """Structure with one member replaced."""
+        agg = _split_constant(agg)
+        if isinstance(agg, StructByMembers):
+            return agg.changed(self, value, _position(idx))
+        return super().insert_value(_as_value(self, agg), _as_value(self, value), _position(idx), name)
+
+    def store(self, value, ptr, align=None):
+        """Write a value."""
+        return super().store(_as_value(self, value), ptr, align)
+
+    def call(self, fn, args, *more, **named):
+        """Call a function."""
+        return super().call(fn, [_as_value(self, each) for each in args], *more, **named)
+
+    def select(self, cond, lhs, rhs, *more, **named):
+        """One of two values."""
+        return super().select(cond, _as_value(self, lhs), _as_value(self, rhs), *more, **named)
+
+    def phi(self, typ, name="", flags=()):
+        """Value that depends on the block that control comes from."""
+        made = _Phi(self, typ, name, flags)
+        self._insert(made)
+        return made
+
+    def mul(self, lhs, rhs, name="", flags=()):
+        """Product of integers."""
+        if _is(lhs, 1):
+            return rhs
+        if _is(rhs, 1):
+            return lhs
+        if _is_number(lhs) and _is_number(rhs):
+            return ir.Constant(lhs.type, lhs.constant * rhs.constant)
+        return super().mul(lhs, rhs, name, flags)
+
+    def add(self, lhs, rhs, name="", flags=()):
+        """Sum of integers."""
+        if _is(lhs, 0):
+            return rhs
+        if _is(rhs, 0):
+            return lhs
+        if _is_number(lhs) and _is_number(rhs):
+            return ir.Constant(lhs.type, lhs.constant + rhs.constant)
+        return super().add(lhs, rhs, name, flags)
+
+
+class _Phi(ir.PhiInstr):
+    """Phi node whose values may be structures."""
+
+    def __init__(self, builder, typ, name, flags):
+        super().__init__(builder.block, typ, name, flags)
+        self._builder = builder
+
+    def add_incoming(self, value, block):
+        """Add the value for control that comes from a block."""
+        with self._builder.goto_block(block):
+            super().add_incoming(_as_value(self._builder, value), block)
+
+
+def kernel_builder(block: ir.Block) -> KernelBuilder:
+    """Builder of a kernel's instructions, at the end of a block."""
+    return FoldingBuilder(block) if is_on("folding_builder") else KernelBuilder(block)
+
+
+def _factors(value) -> tuple:
+    """Factors of a product of numbers or lanes; none of anything else."""
+    is_product = isinstance(value, ir.Instruction) and value.opname == "fmul"
+    return tuple(value.operands) if is_product and value.type != ir.FloatType() else ()
+
+
+def fused_multiply_add(builder, a, b, c):
+    """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
+
+    The instruction is chosen here instead of by LLVM (its flag `contract`). LLVM would fuse in one kernel and not in
+    another, depending on the rest of the kernel.
+    """
+    width = f"v{c.type.count}" if isinstance(c.type, ir.VectorType) else ""
+    type_ = ir.FunctionType(c.type, [c.type] * 3)
+    return builder.call(cgutils.get_or_insert_function(builder.module, type_, f"llvm.fma.{width}f64"), (a, b, c))
+
+
+def _as_value(builder, value):
+    return value.read(builder) if isinstance(value, (StructInMemory, StructByMembers)) else value
+
+
+def _is_number(value) -> bool:
+    return isinstance(value, ir.Constant) and isinstance(value.constant, int)
+
+
+def _is(value, number: int) -> bool:
+    return _is_number(value) and value.constant == number
+
+
+def word_constant(value: int) -> ir.Constant:
+    """Constant word."""
+    return ir.Constant(WORD, value)
+
+
+def known_integer(value):
+    """Integer of a constant value, or None."""
+    return value.constant if _is_number(value) else None
+
+
+def stack_slot(builder: ir.IRBuilder, type_: ir.Type):
+    """Memory of a variable for the run of its function, uninitialised."""
+    with builder.goto_entry_block():
+        return builder.alloca(type_)

@@ -1,0 +1,121 @@
+"""Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
+
+Kernels own nothing (`physics.compiler.decorators`), so no variable has to be released, or kept for a release.
+Numba's lowering reads the old value of a variable before each assignment, and reads and clears it at the end of its
+life; an array has seven words to read and to clear. A third of all instructions did only this.
+
+In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
+passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from numba.core import ir
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
+from numba.core.typed_passes import NativeLowering
+
+from physics.compiler.fused.ablation import is_on
+from physics.compiler.fused.folding_builder import kernel_builder, stack_slot
+from physics.compiler.fused.prepared_entry import write_prepared_entry
+
+
+class _Values(Lower):
+    """Numba's lowering of one function, in which a variable assigned once is a value, and nothing is released."""
+
+    def _find_singly_assigned_variable(self):
+        times = Counter(
+            each.target.name for block in self.blocks.values() for each in block.body if isinstance(each, ir.Assign)
+        )
+        self._singly_assigned_vars = {name for name, count in times.items() if count == 1}
+        self._blk_local_varmap = {}
+
+    def loadvar(self, name):
+        """Value of a variable."""
+        value = self._blk_local_varmap.get(name)
+        if value is not None:
+            return value
+        self._singly_assigned_vars.discard(name)  # a block used it that is lowered before the one that assigns it
+        return self.builder.load(self.getvar(name))
+
+    def alloca_lltype(self, name, lltype, datamodel=None):
+        """Memory of a variable that is assigned more than once."""
+        return stack_slot(self.builder, lltype)
+
+    def storevar(self, value, name, argidx=None):
+        """Give a variable a value."""
+        if name in self._singly_assigned_vars:
+            self._blk_local_varmap[name] = value
+        else:
+            self.builder.store(value, self.getvar(name))
+
+    def delvar(self, name):
+        """Ignore the end of a variable's life: kernels count no references."""
+
+
+class _KernelLower(_Values if is_on("lowering") else Lower):
+    """Lowering of a kernel, with our builder, and an entry for machine code."""
+
+    def setup_function(self, fndesc):
+        """Declare the function, with our builder for its body."""
+        super().setup_function(fndesc)
+        self.builder = kernel_builder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+        if is_on("cold_kernels") and getattr(self.func_ir.func_id.func, "is_cold", False):  # `decorators.cold_kernel`
+            self.function.attributes.add("noinline")
+
+    def create_cfunc_wrapper(self):
+        """Make the entry for machine code, in place of Numba's for C; see `prepared_entry`."""
+        write_prepared_entry(self.context, self.library, self.fndesc)
+
+    def lower_block(self, block):
+        """Lower the statements of a block; unsupported ones raise an error in its own words."""
+        self._cur_ir_block = block
+        for each in block.body:
+            self.loc = each.loc
+            if isinstance(each, ir.Assign):
+                name = each.target.name
+                self.storevar(self.lower_assign(self.typeof(name), each), name)
+            else:
+                self.lower_inst(each)
+
+    if is_on("scalars"):
+
+        def lower_binop(self, resty, expr, op):
+            """Lower an operation on two values; constants in it need no values of their own (`scalars` sees them)."""
+            context, builder = self.context, self.builder
+            function = context.typing_context.resolve_value_type(op)
+            sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
+            operands = [
+                context.cast(builder, self.loadvar(each.name), self.typeof(each.name), type_)
+                for each, type_ in zip((expr.lhs, expr.rhs), sig.args, strict=True)
+            ]
+            value = context.get_function(function, sig)(builder, operands)
+            return context.cast(builder, value, sig.return_type, resty)
+
+
+class _UserLower(Lower):
+    """Lowering of a user's function, which tracks the present statement for exceptions."""
+
+    def lower_inst(self, inst):
+        """Lower a statement."""
+        self.builder.place = self.loc, self.func_ir.func_id.func_name
+        super().lower_inst(inst)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class UserLowering(NativeLowering):
+    """Pass that lowers a user's function."""
+
+    _name = "users_lowering"
+    lowering_class = _UserLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """Pass that lowers a kernel."""
+
+    _name = "kernel_lowering"
+    lowering_class = _KernelLower

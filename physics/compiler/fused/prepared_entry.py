@@ -1,0 +1,62 @@
+"""Entries of kernels for machine code: arguments are read from memory.
+
+Python passes two dozen arguments to a kernel. Of each array it reads seven words from a Python object, and only one
+thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of all
+those words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: of an array Numba's
+words, of a tuple those of its members. The entry returns Numba's status, which is not 0 if the kernel raised an
+exception; its address is then written.
+"""
+
+from __future__ import annotations
+
+from llvmlite import ir
+from numba.core import types
+from numba.core.callconv import excinfo_ptr_t
+
+from physics.compiler.fused.folding_builder import (
+    WORD,
+    FoldingBuilder,
+    StructInMemory,
+    kernel_builder,
+    make_struct,
+    word_constant,
+)
+
+WORD_SIZE = 8  # [bytes]
+STATUS_TYPE = ir.IntType(32)
+ENTRY_TYPE = ir.FunctionType(STATUS_TYPE, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
+
+
+def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> tuple:
+    """Value of an argument whose words begin at `place`, and the place behind it. Each number has a word of its own."""
+    form = context.get_value_type(type_)
+    if isinstance(type_, types.BaseTuple):
+        members = []
+        for member in type_.types:
+            value, place = _read(context, builder, words, member, place)
+            members.append(value)
+        return make_struct(builder, form, members), place
+    address = builder.bitcast(builder.gep(words, [word_constant(place)]), form.as_pointer())
+    is_read_later = isinstance(form, ir.Aggregate) and isinstance(builder, FoldingBuilder)
+    value = StructInMemory(address) if is_read_later else builder.load(address)
+    return value, place - (-context.get_abi_sizeof(form) // WORD_SIZE)
+
+
+def write_prepared_entry(context, library, about) -> None:
+    """Add the second entry of a kernel to its library."""
+    if about.restype != types.none:
+        return
+    module = context.create_module("ready")
+    kernel = context.declare_function(module, about)
+    entry = ir.Function(module, ENTRY_TYPE, about.llvm_cfunc_wrapper_name)
+    builder = kernel_builder(entry.append_basic_block())
+    values, place = [], 0
+    for type_ in about.argtypes:
+        value, place = _read(context, builder, entry.args[0], type_, place)
+        values.append(value)
+    status, _ = context.call_conv.call_function(builder, kernel, about.restype, about.argtypes, values)
+    with builder.if_then(status.is_error):
+        builder.store(status.excinfoptr, entry.args[1])
+        builder.ret(status.code)
+    builder.ret(STATUS_TYPE(0))
+    library.add_ir_module(module)
