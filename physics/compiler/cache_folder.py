@@ -72,6 +72,9 @@ def source_digest(*folders: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+# Packages with kernels whose machine code does not depend on where they are installed.
+PACKAGES = Path(__file__).parents[1].resolve(), Path(__file__).parents[2].resolve() / "rigid_env"
+
 # All that machine code may depend on: these compilers, and every folder of kernels beside them.
 SOURCES = Path(__file__).parent, Path(__file__).parents[1] / "kernels"
 

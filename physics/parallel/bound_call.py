@@ -68,14 +68,22 @@ def compiling():
     Meanwhile the garbage collector scans Numba's growing tables less often; it would take a tenth or a fifth of the
     time.
     """
-    text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
-    timer = threading.Timer(COMPILE_NOTICE, lambda: print(text, file=sys.stderr, flush=True))
-    timer.daemon = True
+    is_over = threading.Event()
     before = gc.get_threshold()
-    timer.start()
     gc.set_threshold(*backend.COLLECT_AT)
     try:
-        yield
+        with backend.count_compilations() as count:
+            threading.Thread(target=_tell, args=(count, is_over), daemon=True).start()
+            yield
     finally:
-        timer.cancel()
+        is_over.set()
         gc.set_threshold(*before)
+
+
+def _tell(count: Callable[[], int], is_over: threading.Event) -> None:
+    """Print a line as soon as something compiles and some time has passed; loading alone is not worth one."""
+    while not is_over.wait(COMPILE_NOTICE):
+        if count() > 0:
+            text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
+            print(text, file=sys.stderr, flush=True)
+            return

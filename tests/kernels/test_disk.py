@@ -307,3 +307,47 @@ def test_processes_at_once_and_killed_ones(program, kept, tmp_path, is_exhaustiv
     with killed_after(both[0], 200.0), killed_after(both[1], 200.0):
         assert [each.communicate()[0].split()[0] for each in both] == [kept[1]] * 2
     assert program.run(tmp_path) == (kept[1], 1, [])
+
+
+def test_of_several_processes_one_compiles(program, kept, tmp_path):
+    """Four at once on an empty cache: one file each, no lock is left, and the same results."""
+    command, environment = program.command_and_environment(tmp_path)
+    started = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+    ends = []
+    for each in started:
+        with killed_after(each, 200.0):
+            ends.append(each.communicate()[0].split())
+    assert [found for found, _ in ends] == [kept[1]] * 4
+    assert sorted(hits for _, hits in ends) == ["0", "1", "1", "1"]
+    assert list(tmp_path.rglob("*.lock")) == []
+
+
+def test_a_process_that_dies_while_it_compiles_holds_nobody_up(program, kept, tmp_path):
+    path = program.file(kept[0])
+    lock = tmp_path / path.parent.name / f"{path.name}.lock"
+    holder = (
+        "import sys, time; from filelock import FileLock\n"
+        "lock = FileLock(sys.argv[1]); lock.acquire(); print(1, flush=True); time.sleep(99)"
+    )
+    lock.parent.mkdir(parents=True)
+    holding = subprocess.Popen([sys.executable, "-c", holder, str(lock)], stdout=subprocess.PIPE, text=True)
+    assert holding.stdout.readline() == "1\n"
+    command, environment = program.command_and_environment(tmp_path)
+    waiting = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with killed_after(waiting, 200.0):
+        line = waiting.stderr.readline()
+        holding.kill()
+        assert waiting.communicate()[0].split() == [kept[1], "0"]
+    assert line == "rigid-env: another process compiles a kernel for this scene: waiting for it ...\n"
+    holding.wait()
+    assert list(tmp_path.rglob("*.lock")) == []
+
+
+def test_sources_at_another_place_compile_nothing(program, kept, tmp_path):
+    """A copy of `physics`: its kernels are those of the original. A program's own file is known by its place."""
+    if program.name == "whole":
+        pytest.skip("a program's own kernels")
+    shutil.copytree(Path(ROOT) / "physics", tmp_path / "physics", ignore=shutil.ignore_patterns("__pycache__"))
+    command, environment = program.command_and_environment(kept[0])
+    done = subprocess.run(command, env={**environment, "PYTHONPATH": str(tmp_path)}, capture_output=True, text=True)
+    assert done.stdout.split() == [kept[1], "1"], done.stderr

@@ -23,6 +23,7 @@ OPTIMISATIONS = {
     "inlined_kernels": "no call is left of what is a few instructions long",
     "lowering": "a variable that is assigned once is a value without memory; none is read or cleared to release it",
     "memoised_contexts": "types and lowerings of operations and sizes of types are determined once",
+    "one_process": "of several processes that want a kernel one compiles it, and the others wait for its file",
     "passes": "a kernel goes through the passes that it needs, not through all of Numba's",
     "paused_gc": "the garbage collector waits while kernels are compiled",
     "ranges": "loops count without asking whether the step is zero",

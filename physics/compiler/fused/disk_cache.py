@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -17,9 +18,10 @@ from numba.core.compiler import CompileResult, compile_result
 from numba.core.environment import Environment
 from numba.core.serialize import dumps
 
-from physics.compiler.cache_folder import is_owned_by_user
+from physics.compiler.cache_folder import PACKAGES, SOURCES, is_owned_by_user, source_digest
 from physics.compiler.fused import cache_files
 from physics.compiler.fused.code_libraries import SharedLibrary
+from physics.compiler.fused.one_process import one_process
 from physics.compiler.notices import warn, warn_once
 
 
@@ -72,6 +74,13 @@ class _Cache:
             warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
         return None
 
+    def one_process(self, sig, target_context) -> AbstractContextManager[None]:
+        """Hold the right to compile for the types `sig` of arguments, if that may be kept (`one_process`)."""
+        if not self._is_enabled:
+            return nullcontext()
+        path, _ = self._place(sig, target_context.codegen())
+        return nullcontext() if path.is_file() else one_process(path)
+
     def save_overload(self, sig, made):
         """Keep machine code, if that is possible."""
         if not self._is_enabled or made.library.has_dynamic_globals:
@@ -98,7 +107,7 @@ class _Cache:
         function = self._function
         around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
         versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
-        parts = (repr(versions).encode(), str(self._source.resolve()).encode(), self._name.encode(),
+        parts = (repr(versions).encode(), _place_of(self._source), self._name.encode(),
                  _digest_of_file(self._source), function.__code__.co_code, around)  # fmt: skip
         return b"".join(hashlib.sha256(part).digest() for part in parts)
 
@@ -106,6 +115,21 @@ class _Cache:
         """File of machine code, and its purpose."""
         purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
         return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
+
+
+@cache
+def _place_of(source: Path) -> bytes:
+    """What tells a source from others of the same content: of our packages, what stands around it and not where.
+
+    `cache_folder.folder_name` has a digest of what stands around most kernels of `physics`.
+    """
+    source = source.resolve()
+    for package in PACKAGES:
+        if source.is_relative_to(package):
+            is_in_name = any(source.is_relative_to(folder.resolve()) for folder in SOURCES)
+            around = "" if is_in_name else source_digest(source.parent)
+            return f"{package.name}/{source.relative_to(package).as_posix()} {around}".encode()
+    return str(source).encode()
 
 
 @cache

@@ -166,11 +166,20 @@ class _Shared(_Part):
             with global_compiler_lock:
                 kept = self._cache.load_overload(args, MemoisedTarget(self.targetctx))
                 if kept is None:
-                    super().compile(sig)
-                    self._cache.save_overload(args, self.overloads[args])
+                    self._compile_here(args)
                 else:
                     self.add_overload(kept)
         return self.overloads[args].entry_point
+
+    def _compile_here(self, args):
+        """Compile it and keep it on disk, unless another process has done so meanwhile."""
+        with self._cache.one_process(args, self.targetctx):
+            kept = self._cache.load_overload(args, MemoisedTarget(self.targetctx))
+            if kept is None:
+                super().compile(args)
+                self._cache.save_overload(args, self.overloads[args])
+            else:
+                self.add_overload(kept)
 
 
 PART_KIND = _Part, _PartCompiler
@@ -210,6 +219,14 @@ class Kernel(CPUDispatcher):
         self._cache = WholeCache(self.py_func, folder)
         if isinstance(self._part, _Shared):
             self._part.enable_caching(folder)
+
+    def compile(self, sig):
+        """Load the machine code for the types of its arguments from disk, or compile it, in one process of several."""
+        args, _ = normalize_signature(sig)
+        if args in self.overloads or not isinstance(self._cache, WholeCache):
+            return super().compile(sig)
+        with global_compiler_lock, self._cache.one_process(args, self.targetctx):
+            return super().compile(sig)
 
     def stand(self, args: tuple) -> None:
         """Compile the machine code that other kernels call, for these types of arguments."""

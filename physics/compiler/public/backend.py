@@ -115,9 +115,9 @@ def machine_code(kernel, arguments: tuple) -> Callable:
         declare_members(arguments)
         whole = _entry(kernel)
         loaded = sum(whole.stats.cache_hits.values())
+        _compilations += 1  # as far as is known until it ends
         code = whole.compile(tuple(map(numba.typeof, arguments)))
-        if sum(whole.stats.cache_hits.values()) == loaded:
-            _compilations += 1
+        _compilations -= sum(whole.stats.cache_hits.values()) - loaded
     return code
 
 
