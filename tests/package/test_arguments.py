@@ -12,6 +12,7 @@ MOST = 9
 SEEN = {
     "agents/accuracy_transfer.py main": "command",
     "agents/record.py main": "command",
+    "agents/sweep.py main": "command",
     "agents/train.py main": "command",
     "physics/scene/bodies.py Block.__init__": "for editors: the dataclass makes another one",
     "rigid_env/cli/exploring.py run": "command",
