@@ -36,7 +36,7 @@ def bouncing(restitution=0.5, worlds=1, accuracy="balanced", **more) -> physics.
 # --- closed forms ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("accuracy", PRESETS)
+@pytest.mark.parametrize("accuracy", [*PRESETS, "reference"])
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 def test_a_ball_gets_its_change_of_momentum(accuracy, restitution):
     """p = (1 + e) m v, at the lowest point; one product and one sum more than the velocity has roundings."""
@@ -57,7 +57,7 @@ def test_a_ball_gets_its_change_of_momentum(accuracy, restitution):
     assert not world.read_impacts().total.any()
 
 
-@pytest.mark.parametrize("accuracy", PRESETS)
+@pytest.mark.parametrize("accuracy", [*PRESETS, "reference"])
 def test_two_balls_get_opposite_impulses(accuracy):
     """p = (1 + e) v m₁ m₂/(m₁ + m₂) along the line of centres, to the tolerance of the contact problem."""
     balls = [ball(x=-0.505, vx=4.0, y=5.0), ball(x=0.505, mass=6.0, y=5.0)]
