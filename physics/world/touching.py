@@ -170,7 +170,7 @@ class Touching(Batch):
         return validation.index(world, self.worlds, "world")
 
     def _chosen(self, worlds: ArrayLike | None) -> NDArray[np.int64]:
-        return np.arange(self.worlds) if worlds is None else choice.chosen(worlds, self.worlds, once=False)
+        return np.arange(self.worlds) if worlds is None else choice.world_indices(worlds, self.worlds, once=False)
 
     def _body(self, body: int | None) -> int:
         return EVERY_BODY if body is None else validation.index(body, self.body_count, "body")

@@ -17,7 +17,7 @@ from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.tasks.arguments import part, takes
 
-ONE = ("render_mode", "width", "height", "obs", "obs_size", "obs_stack", "contacts")
+ONE = ("render_mode", "width", "height", "obs", "obs_size", "obs_stack", "contacts", "impacts")
 MANY = ("autoreset_mode", "max_episode_steps", *ONE)
 
 
