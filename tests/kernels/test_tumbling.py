@@ -55,8 +55,8 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
     many = physics.World(scene).scratch[0]
     has_hulls = True if "hull" in (first, second) else None
     for k, body in enumerate((a, b)):
-        many.bodies.work[k]["shape"] = {"block": 0, "sphere": SPHERE, "ellipsoid": 2, "hull": HULL}[(first, second)[k]]
-        many.bodies.work[k]["dims"] = _dims(body)
+        many.bodies.body[k]["shape"] = {"block": 0, "sphere": SPHERE, "ellipsoid": 2, "hull": HULL}[(first, second)[k]]
+        many.bodies.body[k]["dims"] = _dims(body)
     rng = np.random.default_rng(3)
     for k in range(12):
         R, S = (truth.Rotation.random(random_state=rng.integers(1 << 30)).as_matrix() for _ in range(2))
