@@ -137,12 +137,12 @@ def test_what_arrives_belongs_where_loads_could_have_made_it_as_fast(share, high
 
 @kernel
 def _store(n, width, memory, h, scratch):
-    store_warm_start(n, width, memory, 0, h, scratch[0])
+    store_warm_start(n, width, memory, 0, h, scratch[0].contacts)
 
 
 @kernel
 def _load(n, width, memory, h, scratch):
-    load_warm_start(n, width, memory, 0, h, scratch[0])
+    load_warm_start(n, width, memory, 0, h, scratch[0].contacts)
 
 
 stages = st.lists(st.sets(st.integers(0, 2 * FEATURES - 1), max_size=5).map(sorted), min_size=1, max_size=8)

@@ -274,13 +274,8 @@ def cone_sweeps(n, mu, tolerance, limit, scratch):
         [m/s], measured on the returned impulses.
     """
     contacts = scratch.contacts
-    p, u, W, local, change = (
-        contacts.impulse,
-        contacts.velocity,
-        contacts.delassus,
-        scratch.solver.local,
-        scratch.solver.change,
-    )
+    p, u, W = contacts.impulse, contacts.velocity, contacts.delassus
+    local, change = scratch.solver.local, scratch.solver.change
     rows = 3 * n
     update_contact_velocities(rows, W, p, contacts.bias, u)
     residual = cone_residual(n, p, u, mu, local)

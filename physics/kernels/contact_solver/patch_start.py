@@ -35,9 +35,8 @@ def warm_start_friction(n, on, scratch):
     contacts = scratch.contacts
     p = on * gather_component(contacts.impulse, 0, n)
     s = select_lanes(p > 0.0, 1.0 / p, 0.0)
-    return s * gather_component(contacts.impulse, 1, n), s * gather_component(contacts.impulse, 2, n) / friction_ratio(
-        scratch.body
-    )
+    x, y = gather_component(contacts.impulse, 1, n), gather_component(contacts.impulse, 2, n)
+    return s * x, s * y / friction_ratio(scratch.body)
 
 
 @inlined

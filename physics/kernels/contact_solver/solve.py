@@ -180,16 +180,10 @@ def _assemble_problem(n, width, R, v, L, scratch):
 def _sweep_normals(n, contact, goal, scratch):
     """Sweeps without friction: (sweeps, residual [m/s])."""
     contacts = scratch.contacts
-    if contact_stiffness(scratch.body) > 0.0:  # W is positive definite, but sweeps crawl where γ is small: pivots first
-        solve_normal_lcp(
-            contacts.delassus,
-            contacts.bias,
-            n,
-            contacts.impulse,
-            scratch.solver.fallback_float,
-            scratch.solver.fallback_int,
-            MAX_PIVOTS,
-        )
+    if contact_stiffness(scratch.body) > 0.0:
+        # W is positive definite, but sweeps crawl where γ is small: a few pivots first.
+        floats, index = scratch.solver.fallback_float, scratch.solver.fallback_int
+        solve_normal_lcp(contacts.delassus, contacts.bias, n, contacts.impulse, floats, index, MAX_PIVOTS)
     return normal_sweeps(n, goal, scratch.settings.sweeps, contacts)
 
 
@@ -201,7 +195,8 @@ def _sweep_and_newton(n, contact, goal, scratch):
     for i in range(n):
         scratch.contacts.friction[i] = scratch.body.mu
     left, at_once, turns = scratch.settings.sweeps, _SWEEPS_PER_ROUND, 0
-    if contact_stiffness(scratch.body) > 0.0:  # normals are determined, and Newton's method shares tangents out evenly
+    if contact_stiffness(scratch.body) > 0.0:
+        # The normals are determined, and Newton's method shares tangents out evenly.
         at_once = 0
     while True:
         sweeps, residual = cone_sweeps(n, scratch.contacts.friction, goal, min(left, at_once), scratch)

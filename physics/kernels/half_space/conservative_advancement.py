@@ -165,12 +165,8 @@ def safe_advance(y, wall, horizon, spin, offset_frame, scratch):
     body = scratch.body
     x, q, v, L = y
     n, R, w = wall_normal(scratch.scene.walls, wall), to_matrix(q), angular_velocity(q, L, body, offset_frame)
-    m, d, c, a = (
-        qt.cross(n, w),
-        qt.dot(n, x) - scratch.scene.walls[wall, WALL_OFFSET],
-        (0.0, 0.0, 0.0),
-        body.free_acceleration,
-    )
+    m, d = qt.cross(n, w), qt.dot(n, x) - scratch.scene.walls[wall, WALL_OFFSET]
+    c, a = (0.0, 0.0, 0.0), body.free_acceleration
     if offset_frame is not None:
         c = center_arm(R, body)
     rate = qt.dot(n, v)

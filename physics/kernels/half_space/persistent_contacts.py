@@ -97,10 +97,8 @@ def cancel_separation(y, h, offset_frame, memory, scratch):
     if not (a < 0.0 and gap + h * (u + 0.5 * h * a) > 0.0):
         return y, False
     place_arms(1, qt.to_matrix(q), offset_frame, scratch)
-    n, r = (
-        wall_normal(scratch.scene.walls, wall_of(slot, scratch.scene)),
-        (contacts.arm[0, 0], contacts.arm[0, 1], contacts.arm[0, 2]),
-    )
+    n = wall_normal(scratch.scene.walls, wall_of(slot, scratch.scene))
+    r = (contacts.arm[0, 0], contacts.arm[0, 1], contacts.arm[0, 2])
     m = qt.cross(r, n)
     spin = apply_inv_inertia(qt.to_matrix(principal_attitude(q, body, offset_frame)), m, body.J)
     p = min(u / (1.0 / body.mass + qt.dot(m, spin)), last_normal_impulse(slot, memory, scratch))
