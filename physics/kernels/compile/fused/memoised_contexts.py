@@ -27,7 +27,7 @@ from numba.extending import models, register_model
 from physics.kernels.compile.fused import calling_convention
 from physics.kernels.compile.fused.ablation import is_on
 from physics.kernels.compile.fused.argument_passing import Arguments
-from physics.kernels.compile.fused.array_elements import array_in_record
+from physics.kernels.compile.fused.array_elements import array_in_record, record_in_record
 from physics.kernels.compile.fused.folding_builder import KernelBuilder
 from physics.kernels.compile.fused.operation_table import lowering_of, signature_of
 
@@ -201,8 +201,11 @@ class MemoisedTarget(CPUContext):
 
         def get_getattr(self, typ, attr):
             """Return the function that reads a member of a value."""
-            if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+            member = typ.typeof(attr) if isinstance(typ, types.Record) else None
+            if isinstance(member, types.NestedArray):
                 return array_in_record
+            if isinstance(member, types.Record):
+                return record_in_record
             return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
