@@ -28,7 +28,7 @@ SHAPES = {
 @kernel
 def safe_time_of(y, horizon, scratch):
     """(bound of |ω|, gap, safe time) of a body and the first wall."""
-    spin = spin_bound(y[1], y[3], horizon, None, scratch[0])
+    spin = spin_bound(y[1], y[3], horizon, None, scratch[0].body)
     gap, t = safe_advance(y, 0, horizon, spin, None, scratch[0])
     return spin, gap, t
 
