@@ -107,7 +107,7 @@ def pile(seed: int, bodies: int, contacts: int, mu: float, masses: float = 1.0) 
     rng = np.random.default_rng(seed)
     many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     mass = masses ** rng.uniform(-1, 1, bodies)
-    many.bodies.work["mass"], many.bodies.work["radius"], many.bodies.inv_mass[:] = mass, 1.0, 1 / mass
+    many.bodies.body["mass"], many.bodies.body["radius"], many.bodies.inv_mass[:] = mass, 1.0, 1 / mass
     for b in range(bodies):
         A = rng.normal(size=(3, 3))
         K = (A @ A.T + np.eye(3)) / mass[b]

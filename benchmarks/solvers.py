@@ -100,13 +100,13 @@ def _complementarity_solvers(
     """Solvers by name: () -> (whether one was found, iterations, z)."""
     M, q, n = problem.M, problem.q, len(problem.q)
     z = np.zeros(n)
-    work = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
-    work["delassus"][:n, :n], work["bias"][:n] = M, q
+    scratch = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
+    scratch["contacts"]["delassus"][:n, :n], scratch["contacts"]["bias"][:n] = M, q
 
     def sweeps():
-        work["impulse"][:n] = 0.0
-        count, _ = normal_sweeps(n, TOLERANCE * np.abs(q).max(), LIMIT, work)
-        return True, count, work["impulse"][:n]
+        scratch["contacts"]["impulse"][:n] = 0.0
+        count, _ = normal_sweeps(n, TOLERANCE * np.abs(q).max(), LIMIT, scratch["contacts"])
+        return True, count, scratch["contacts"]["impulse"][:n]
 
     def pivots(method, sizes):
         shape, length = sizes(n)
@@ -188,13 +188,13 @@ def solve_bodies(method, times, n, twists, limit, many):
     return count, worst
 
 
-def _dense_work(problem: problems.Frictional):
+def _dense_scratch(problem: problems.Frictional):
     """A workspace with W, b and μ of a problem."""
     n, (J, inverse, b) = problem.count, problem.dense()
-    work = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
-    work["delassus"][: 3 * n, : 3 * n], work["bias"][: 3 * n] = J @ inverse @ J.T, b
-    work["friction"][:n] = problem.many.contacts.mu[:n]
-    return work
+    scratch = make_workspace(np.zeros((-(-n // FEATURES), at.WALL_SIZE)), FEATURES)[0]
+    scratch["contacts"]["delassus"][: 3 * n, : 3 * n], scratch["contacts"]["bias"][: 3 * n] = J @ inverse @ J.T, b
+    scratch["contacts"]["friction"][:n] = problem.many.contacts.mu[:n]
+    return scratch
 
 
 def _residual_of_impulses(problem: problems.Frictional, p: np.ndarray) -> float:
@@ -219,22 +219,23 @@ def with_friction(problem: problems.Frictional, samples: int) -> list[Outcome]:
         outcomes.append(Outcome(problem.name, name, n, int(count), float(residual), seconds))
     if n > MOST_DENSE:
         return outcomes
-    work = _dense_work(problem)
-    goal = TOLERANCE * np.abs(work["bias"][: 3 * n]).max()
+    scratch = _dense_scratch(problem)
+    goal = TOLERANCE * np.abs(scratch["contacts"]["bias"][: 3 * n]).max()
 
     def sweeps():
-        work["impulse"][:] = work["change"][:] = 0.0
-        invert_contact_blocks(n, work)
-        return cone_sweeps(n, work["friction"], goal, LIMIT, work)[0]
+        scratch["contacts"]["impulse"][:] = scratch["solver"]["change"][:] = 0.0
+        invert_contact_blocks(n, scratch)
+        return cone_sweeps(n, scratch["contacts"]["friction"], goal, LIMIT, scratch)[0]
 
     def pyramid():
-        work["impulse"][:] = 0.0
-        W, b, mu, p = (work[name] for name in ("delassus", "bias", "friction", "impulse"))
-        return solve_pyramid_lcp(W, b, mu, n, p, work["fallback_float"], work["fallback_int"], PIVOTS)[1]
+        scratch["contacts"]["impulse"][:] = 0.0
+        W, b, mu, p = (scratch["contacts"][name] for name in ("delassus", "bias", "friction", "impulse"))
+        floats, index = scratch["solver"]["fallback_float"], scratch["solver"]["fallback_int"]
+        return solve_pyramid_lcp(W, b, mu, n, p, floats, index, PIVOTS)[1]
 
     for name, solve in (("sweeps, dense", sweeps), ("Lemke, pyramid", pyramid)):
         count = solve()
-        residual = _residual_of_impulses(problem, np.array(work["impulse"][: 3 * n]))
+        residual = _residual_of_impulses(problem, np.array(scratch["contacts"]["impulse"][: 3 * n]))
         seconds = timed(lambda k, s=solve: [s() for _ in range(k)], samples)
         outcomes.append(Outcome(problem.name, name, n, int(count), float(residual), seconds))
     return outcomes

@@ -44,7 +44,7 @@ class Recorder:
 
     The recorder sees every step of `World.step`, of a `Stepper` and of an environment. It sees every change by
     `set_state`, `set_parameters` and `restore`, but not arrays of the world written directly. Worlds are independent,
-    so a file holds one world only. A world without a recorder does no work for it.
+    so a file holds one world only. A world without a recorder pays nothing for it.
 
     Parameters
     ----------

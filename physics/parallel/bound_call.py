@@ -11,13 +11,13 @@ from contextlib import contextmanager
 from physics.compiler.decorators import backend
 
 if backend.PREPARES_CALLS:
-    from physics.parallel.prepared_work import PreparedWork as Work
-    from physics.parallel.prepared_work import entry, loop_kernel, perform_all
+    from physics.parallel.prepared_call import PreparedCall as BoundCall
+    from physics.parallel.prepared_call import entry, loop_kernel, perform_all
 else:
-    from physics.parallel.direct_work import DirectWork as Work
-    from physics.parallel.direct_work import entry, loop_kernel, perform_all
+    from physics.parallel.direct_call import DirectCall as BoundCall
+    from physics.parallel.direct_call import entry, loop_kernel, perform_all
 
-__all__ = ["Work", "bound", "bound_alike", "compiled", "compiled_entry", "compiling", "loop_kernel", "perform_all"]
+__all__ = ["BoundCall", "bound", "bound_alike", "compiled", "compiled_entry", "compiling", "loop_kernel", "perform_all"]
 
 # Seconds after which the first step of a plan says that it is compiling.
 COMPILE_NOTICE = 1.0
@@ -33,12 +33,12 @@ def compiled(kernel: Callable, arguments: tuple) -> Callable:
 
 
 def compiled_entry(kernel: Callable, arguments: tuple):
-    """Entry of a kernel that returns nothing, for arguments of these types, as `Work` takes it."""
+    """Entry of a kernel that returns nothing, for arguments of these types, as `BoundCall` takes it."""
     with backend.LOCK, compiling():
         return entry(kernel, arguments)
 
 
-def bound(kernel: Callable, *arguments) -> Work:
+def bound(kernel: Callable, *arguments) -> BoundCall:
     """Bind a kernel that returns nothing to its arguments, for many calls.
 
     Parameters
@@ -48,14 +48,14 @@ def bound(kernel: Callable, *arguments) -> Work:
     *arguments
         Arrays are bound, not copied: a call reads their contents at its time.
     """
-    return Work([(compiled_entry(kernel, arguments), arguments)])
+    return BoundCall([(compiled_entry(kernel, arguments), arguments)])
 
 
-def bound_alike(key, kernel: Callable, *arguments) -> Work:
+def bound_alike(key, kernel: Callable, *arguments) -> BoundCall:
     """Bind a kernel whose types of arguments follow from it and a `key`; this saves the slow look at each argument."""
     if (kernel, key) not in _ENTRIES:
         _ENTRIES[kernel, key] = compiled_entry(kernel, arguments)
-    return Work([(_ENTRIES[kernel, key], arguments)])
+    return BoundCall([(_ENTRIES[kernel, key], arguments)])
 
 
 _ENTRIES: dict[tuple, object] = {}

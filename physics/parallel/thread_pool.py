@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from physics.kernels.parallel import work_stealing as at
 from physics.kernels.state.groups import WorkQueue
-from physics.parallel.bound_call import Work
+from physics.parallel.bound_call import BoundCall
 
 
 class Pool:
@@ -42,7 +42,7 @@ class Pool:
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
-    def run(self, calls: Sequence[Work]) -> None:
+    def run(self, calls: Sequence[BoundCall]) -> None:
         """Make the calls, one per thread, the first in the calling thread; raise the exception of one of them."""
         if self.size == 1:
             calls[0].perform()

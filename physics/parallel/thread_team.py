@@ -24,7 +24,7 @@ from physics.kernels.parallel import spin_wait_workers
 from physics.kernels.parallel import work_stealing as at
 from physics.kernels.state.groups import WorkQueue
 from physics.parallel import processors
-from physics.parallel.bound_call import Work, compiled
+from physics.parallel.bound_call import BoundCall, compiled
 
 # So many worlds a thread takes at once, or fewer where there are few: worlds in contact take several times as long as
 # others, and at the end one thread waits for the other's last ones.
@@ -70,13 +70,13 @@ class Team:
         self.taken = at.make_taken_lists(self.size, worlds)
         self.queues = [WorkQueue(self.turns, taken) for taken in self.taken]
         self._crew = spin_wait_workers.make_worker_table(self.size - 1)
-        self._told: Sequence[Work] | None = None  # what the crew has been told to do
+        self._told: Sequence[BoundCall] | None = None  # what the crew has been told to do
         self._futures: dict[int, Future] = {}
         self._is_interrupted = False  # members may still be busy with the last run
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
-    def run(self, calls: Sequence[Work]) -> None:
+    def run(self, calls: Sequence[BoundCall]) -> None:
         """Make the calls, one per thread, the first in the calling thread.
 
         A call is skipped if its thread has not begun before all worlds are taken; its list of worlds is then empty.
@@ -131,7 +131,7 @@ class Team:
         )
         self._serve = partial(compiled(spin_wait_workers.worker_loop, (self._crew, 0, 0)), self._crew)
 
-    def _tell(self, calls: Sequence[Work]) -> None:
+    def _tell(self, calls: Sequence[BoundCall]) -> None:
         self._told = calls
         for member, call in enumerate(calls[1:], 1):
             (
@@ -165,7 +165,7 @@ class Team:
         self._pool = None
 
 
-def _raise(calls: Sequence[Work]) -> None:
+def _raise(calls: Sequence[BoundCall]) -> None:
     """Raise the exception of one of the calls; clear all, so that a skipped call has none next time."""
     try:
         for call in calls:

@@ -28,7 +28,7 @@ from physics.world.batch import Batch
 from physics.world.report import add_report
 
 if TYPE_CHECKING:
-    from physics.parallel.bound_call import Work
+    from physics.parallel.bound_call import BoundCall
 
 # Treads shorter than this share of the step are rounding of the times they lie between.
 NO_TIME = 1e-9
@@ -65,7 +65,7 @@ class Actuation:
     def _nothing(self) -> np.ndarray:
         return np.zeros((self._shape[0] * self._shape[1], 6))
 
-    def advance(self, world: Batch, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, world: Batch, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make `World.advance` through the actuator; one with a memory is called at each step."""
         if steps == 1 or not self.actuator.remembers:
             self.apply(wrench, dt)

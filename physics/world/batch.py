@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from physics.accuracy import Accuracy
 from physics.kernels.state.sleeping import Sleep
 from physics.kernels.time_stepping.workspace import body_records
-from physics.parallel.bound_call import Work
+from physics.parallel.bound_call import BoundCall
 from physics.parallel.exclusive import Exclusive
 from physics.parallel.team import Team
 from physics.plan.plan import Plan
@@ -48,7 +48,7 @@ class ActuatorState(Protocol):
     def reinstate_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
         """Restore worlds from those of `source` in `kept`."""
 
-    def advance(self, world: Any, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, world: Any, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Make steps with the wrench that the actuators let through."""
 
     def forget(self, worlds: np.ndarray) -> None:
@@ -154,7 +154,7 @@ class Batch(Exclusive):
 
         def _make_event_room(self, room: int) -> None: ...
 
-    def make(self, calls: list[Work], duration: float) -> None:
+    def make(self, calls: list[BoundCall], duration: float) -> None:
         """Make the kernel calls of a time [s]."""
         if self.is_plain:
             self.team.run(calls)
@@ -162,7 +162,7 @@ class Batch(Exclusive):
             self._make_with_more(calls)
         self.time += duration
 
-    def _make_with_more(self, calls: list[Work]) -> None:
+    def _make_with_more(self, calls: list[BoundCall]) -> None:
         """Make the calls, and what belongs to them."""
         if self.plan.fields:
             self._make_with_fields(calls)
@@ -181,7 +181,7 @@ class Batch(Exclusive):
         if self.impacts is not None:
             self.impacts.forget(self, chosen)
 
-    def _make_with_fields(self, calls: list[Work]) -> None:
+    def _make_with_fields(self, calls: list[BoundCall]) -> None:
         """Tell fields the time, and make the calls; an exception of a field then names its class."""
         for scratch in self.scratch:
             body_records(scratch)["call_start"] = self.time

@@ -1,4 +1,4 @@
-"""The steps of a rollout: in machine code, or one by one if Python has work between them."""
+"""The steps of a rollout: in machine code, or one by one if Python has something to do between them."""
 
 from __future__ import annotations
 

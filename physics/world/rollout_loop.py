@@ -15,7 +15,7 @@ from physics.kernels.parallel import work_stealing
 from physics.kernels.parallel.work_stealing import RANGE_CHUNK, RANGE_END, TAKEN_CHUNK_END, begin_taking, take_chunk
 from physics.kernels.state.groups import WorkQueue
 from physics.kernels.time_stepping.workspace import body_records
-from physics.parallel.bound_call import Work, bound_alike, loop_kernel, perform_all
+from physics.parallel.bound_call import BoundCall, bound_alike, loop_kernel, perform_all
 from physics.scene.field_errors import raised
 from physics.world.batch import Batch
 from physics.world.stepper import kernel_calls
@@ -47,7 +47,7 @@ def roll_out(outer, inner, block, starts, clock, moment, calls, count):
     moment : (MOMENT_SIZE,) int64, out
         Where it is: what the calls besides that of the step kernel read.
     calls, count
-        Calls of one step: what `Work.handed` gives.
+        Calls of one step: what `BoundCall.handed` gives.
     """
     begin_taking(outer.turns, outer.taken)
     while True:
@@ -100,13 +100,13 @@ class RolloutLoop:
         self.moments = [np.zeros(MOMENT_SIZE, dtype=np.int64) for _ in self._inner]
         self.taken = [queue.taken for queue in self._inner]
 
-    def run(self, length: int, before: list[Work], after: list[Work]) -> np.ndarray:
+    def run(self, length: int, before: list[BoundCall], after: list[BoundCall]) -> np.ndarray:
         """Step every world `length` times.
 
         Parameters
         ----------
         length : int
-        before, after : list of Work
+        before, after : list of BoundCall
             What each thread does before a step, and after it.
 
         Returns
@@ -149,5 +149,5 @@ def _clock(world: Batch, k: int) -> np.ndarray:
     return np.atleast_1d(body_records(world.scratch[k])["call_start"]) if world.plan.fields else np.zeros(0)
 
 
-def _bound(arguments: tuple) -> Work:
+def _bound(arguments: tuple) -> BoundCall:
     return bound_alike(arguments[4].flags.c_contiguous, roll_out, *arguments)

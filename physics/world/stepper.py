@@ -10,7 +10,7 @@ import numpy as np
 from physics import validation
 from physics.kernels.state.groups import BodyArrays, TimeGrid, WorkQueue
 from physics.keywords import known_keywords
-from physics.parallel.bound_call import Work, bound_alike
+from physics.parallel.bound_call import BoundCall, bound_alike
 from physics.parallel.exclusive import in_use
 from physics.summary import shown
 from physics.world.batch import Batch
@@ -49,7 +49,7 @@ class Stepper:
         world: Batch,
         steps: int = 1,
         dt: float | None = None,
-        then: Callable[[np.ndarray], Work] | None = None,
+        then: Callable[[np.ndarray], BoundCall] | None = None,
     ):
         if not hasattr(world, "no_wrench"):  # the class itself knows this module
             raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
@@ -60,9 +60,9 @@ class Stepper:
         self.dt = world.dt if dt is None else float(validation.positive(dt, (), "dt"))
         self._wrench = world.no_wrench()
         self._then = then
-        self._calls: list[Work] | None = None
-        self._afterwards: list[Work] = []
-        self._alone: Any = None  # the `Work` of `_calls` the only one, where nothing else has a part in a step
+        self._calls: list[BoundCall] | None = None
+        self._afterwards: list[BoundCall] = []
+        self._alone: Any = None  # the `BoundCall` of `_calls` the only one, where nothing else has a part in a step
         self._perform: Callable[[], bool] | None = None  # of that
         self._duration = self.steps * self.dt
 
@@ -129,7 +129,7 @@ def takes_each_step(world: Batch) -> bool:
     return world.actuation is not None and world.actuation.actuator.remembers
 
 
-def _is_all(world: Batch, calls: list[Work]) -> bool:
+def _is_all(world: Batch, calls: list[BoundCall]) -> bool:
     """True if a step is this call: there is one thread, no actuator, and `Batch.make` has nothing to add.
 
     What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
@@ -139,7 +139,7 @@ def _is_all(world: Batch, calls: list[Work]) -> bool:
 
 def kernel_calls(
     world: Batch, wrench: np.ndarray, steps: int, dt: float, queues: Sequence[WorkQueue] | None = None
-) -> list[Work]:
+) -> list[BoundCall]:
     """One call of the step kernel for each thread, all arguments bound.
 
     Parameters
@@ -168,7 +168,7 @@ def kernel_calls(
     return [bound_alike(key, scheme.kernel, *arguments) for arguments in argument_lists]
 
 
-def retime(world: Batch, calls: list[Work], steps: int, dt: float) -> None:
+def retime(world: Batch, calls: list[BoundCall], steps: int, dt: float) -> None:
     """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
     for call in calls:
         call.put(GRID, _time_grid(world, steps, dt))

@@ -17,7 +17,7 @@ from physics.kernels.state import layout as at
 from physics.kernels.state.sleeping import SLEEP_GROUP, SLEEP_SIZE
 from physics.kernels.time_stepping.event_log import EVENT_SIZE
 from physics.keywords import known_keywords
-from physics.parallel.bound_call import Work
+from physics.parallel.bound_call import BoundCall
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
 from physics.plan.plan import SHAPE_CODES, make_plan
@@ -134,7 +134,7 @@ class World(Touching):
             self.plan.scheme.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)
         ]
         self._wrench = self.no_wrench()
-        self._calls: list[Work] = []
+        self._calls: list[BoundCall] = []
         self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
 
     @exclusive
@@ -212,7 +212,7 @@ class World(Touching):
         self.advance(self._calls, self._wrench, steps, dt)
         return self.report
 
-    def advance(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def advance(self, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
         """Run the `kernel_calls` of some steps of `dt` [s] with this wrench, for callers that prepare them.
 
         A `Stepper` skips this function if one call is enough; `stepper._is_all` lists the other parts of a step. If a
@@ -228,7 +228,7 @@ class World(Touching):
         if self.recorder is not None:
             self._tell(self.recorder.after)
 
-    def _make_steps(self, calls: list[Work], wrench: np.ndarray, steps: int, dt: float) -> None:
+    def _make_steps(self, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
         if self.recorder is not None:
             self._tell(self.recorder.before, wrench, steps, dt)
         if self.actuation is None:

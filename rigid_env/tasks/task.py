@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 import physics
 from physics import validation
 from physics.kernels.state import layout as at
-from physics.parallel.bound_call import Work, bound_alike, compiled
+from physics.parallel.bound_call import BoundCall, bound_alike, compiled
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
@@ -219,7 +219,7 @@ class Task(Starts):
         return RolloutLoop(self.world, self.wrench, self.frame_skip, self.world.dt)
 
     @cached_property
-    def rollout_observers(self) -> list[Work]:
+    def rollout_observers(self) -> list[BoundCall]:
         """Calls that observe the worlds that each thread of that loop has stepped."""
         return [self.observer(taken) for taken in self.rollout_loop.taken]
 
@@ -364,7 +364,7 @@ class Task(Starts):
         self._functions = None if self.compiled else Functions(self, is_first=False)
         self._before = self._keeper()
 
-    def observer(self, taken: np.ndarray) -> Work:
+    def observer(self, taken: np.ndarray) -> BoundCall:
         """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
         compiled_task: Any = self.compiled

@@ -40,25 +40,25 @@ class Problem:
         give=None,
     ):
         laws = (LAW_ANISOTROPY,) * (ratio is not None) + (LAW_STIFFNESS, LAW_DAMPING) * (give is not None)
-        self.work = make_workspace(np.array([FLOOR, SIDE]), 8, laws=laws, tolerance=tolerance, sweeps=2000)
+        self.scratch = make_workspace(np.array([FLOOR, SIDE]), 8, laws=laws, tolerance=tolerance, sweeps=2000)
         if ratio is not None:
-            self.work["laws"][0, 0] = ratio
+            self.scratch["body"]["laws"][0, 0] = ratio
         if give is not None:
-            self.work["laws"][0, -2], self.work["give"] = 1.0, give
-        self.one = one = self.work[0]
+            self.scratch["body"]["laws"][0, -2], self.scratch["body"]["give"] = 1.0, give
+        self.one = one = self.scratch[0]
         self.n = n = len(contacts)
         self.quat = tuple(float(c) for c in np.array(quat) / np.linalg.norm(quat))
         self.R = tuple(float(c) for c in to_matrix(self.quat))
         R = np.array(self.R).reshape(3, 3)
         inertia = INERTIA * (mass / MASS) * length**2
-        one["mass"], one["J"], one["mu"] = mass, 1.0 / inertia, mu
-        one["radius"] = length * np.linalg.norm(SIZE)
+        one["body"]["mass"], one["body"]["J"], one["body"]["mu"] = mass, 1.0 / inertia, mu
+        one["body"]["radius"] = length * np.linalg.norm(SIZE)
         signs = np.array([[1 if k >> c & 1 else -1 for c in range(3)] for k in range(8)])
         for i, (wall, vertex) in enumerate(contacts):
-            one["slot"][i] = 8 * wall + vertex
-            one["arm"][i] = R @ (length * SIZE * signs[vertex])
+            one["contacts"]["slot"][i] = 8 * wall + vertex
+            one["contacts"]["arm"][i] = R @ (length * SIZE * signs[vertex])
         if target is not None:
-            one["target"][:n] = target
+            one["contacts"]["target"][:n] = target
         self.v = tuple(float(c) for c in v)
         self.inertia = R @ np.diag(inertia) @ R.T
         self.L = tuple(float(c) for c in self.inertia @ np.array(w, float))
@@ -69,18 +69,18 @@ class Problem:
         """(W, b) of u = W p + b in plain NumPy."""
         rows, n = [], self.n
         for i in range(n):
-            wall = self.one["walls"][self.one["slot"][i] // 8]
+            wall = self.one["scene"]["walls"][self.one["contacts"]["slot"][i] // 8]
             for axis in wall[:9].reshape(3, 3):
-                rows.append(np.concatenate([axis, np.cross(self.one["arm"][i], axis)]))
+                rows.append(np.concatenate([axis, np.cross(self.one["contacts"]["arm"][i], axis)]))
         J = np.array(rows)
         inverse = np.zeros((6, 6))
         inverse[:3, :3] = np.eye(3) / self.mass
         inverse[3:, 3:] = np.linalg.inv(self.inertia)
         twist = np.concatenate([self.v, inverse[3:, 3:] @ np.array(self.L)])
         W = J @ inverse @ J.T
-        if "give" in self.one.dtype.names:
-            W[::3, ::3] += self.one["give"] * np.eye(n)
-        return W, J @ twist - self.one["target"][:n].ravel()
+        if "give" in self.one["body"].dtype.names:
+            W[::3, ::3] += self.one["body"]["give"] * np.eye(n)
+        return W, J @ twist - self.one["contacts"]["target"][:n].ravel()
 
     def residual(self, p):
         """Natural-map residual of impulses (n, 3), see `contact_solver.gauss_seidel`, in plain NumPy: relative."""
@@ -96,11 +96,11 @@ class Problem:
 
     def solve(self, mode=0, friction=True, warm=None):
         """Impulses (n, 3), and what `solve_contacts` returns."""
-        self.one["mode"] = mode
-        self.one["impulse"] = 0.0
+        self.one["stage"]["mode"] = mode
+        self.one["contacts"]["impulse"] = 0.0
         if warm is not None:
-            self.one["impulse"][: 3 * self.n] = np.ravel(warm)
+            self.one["contacts"]["impulse"][: 3 * self.n] = np.ravel(warm)
         contact = ContactSwitches(True, True if friction else None, True)
         result = called(solve_contacts, self.n, contact, self.v, self.L, self.R, self.one)
         width = 3 if friction else 1
-        return np.array(self.one["impulse"][: width * self.n]).reshape(self.n, width), result
+        return np.array(self.one["contacts"]["impulse"][: width * self.n]).reshape(self.n, width), result

@@ -37,29 +37,34 @@ def _aim(n, v, w, alpha, R, h, tilted, scratch):
 
 def posed(slots, gaps, seed, tolerance=1e-9):
     """A workspace with block contacts at these slots and gaps, arms at random."""
-    work = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance)
-    one, n = work[0], len(slots)
-    one["slot"][:n], one["gap"][:n], one["slop"], one["acceleration"] = slots, gaps, SLOP, 10.0
-    one["widest"] = max(0.0, *gaps)
-    one["arm"][:n] = np.random.default_rng(seed).uniform(-2, 2, (n, 3))
-    return work
+    scratch = make_workspace(np.array([FLOOR, SIDE]), 8, tolerance=tolerance)
+    one, n = scratch[0], len(slots)
+    one["contacts"]["slot"][:n], one["contacts"]["gap"][:n], one["body"]["slop"], one["body"]["acceleration"] = (
+        slots,
+        gaps,
+        SLOP,
+        10.0,
+    )
+    one["contacts"]["widest"] = max(0.0, *gaps)
+    one["contacts"]["arm"][:n] = np.random.default_rng(seed).uniform(-2, 2, (n, 3))
+    return scratch
 
 
-def expected(work, n, v, w, alpha):
+def expected(scratch, n, v, w, alpha):
     """Targets by the formulas of `set_resting_targets` and `gainless`, and the scale of their rounding."""
-    one, targets = work[0], np.zeros((n, 3))
+    one, targets = scratch[0], np.zeros((n, 3))
     for i in range(n):
-        wall, r = one["slot"][i] // 8, one["arm"][i]
-        axes = one["walls"][wall][:9].reshape(3, 3)
+        wall, r = one["contacts"]["slot"][i] // 8, one["contacts"]["arm"][i]
+        axes = one["scene"]["walls"][wall][:9].reshape(3, 3)
         gained = axes @ (-H / 2 * (np.cross(w, np.cross(w, r)) + np.cross(alpha, r)))
         u = axes @ (v + np.cross(w, r))
         most, square = u[1:] @ u[1:], gained[1:] @ gained[1:]
         along = gained[1:] * (most / square if square > most else 1.0)
         targets[i] = min(gained[0], max(-u[0], 0.0)), *along
-        same_wall = one["slot"][:n] // 8 == wall
-        if (one["gap"][:n][same_wall] > SLOP).any():
-            targets[i, 0] -= GAP_CLOSING_SHARE * one["gap"][i] / H
-        if np.abs(targets[i]).max() <= max(one["tolerance"] * 10.0 * H, NEGLIGIBLE_SLOP_SHARE * SLOP / H):
+        same_wall = one["contacts"]["slot"][:n] // 8 == wall
+        if (one["contacts"]["gap"][:n][same_wall] > SLOP).any():
+            targets[i, 0] -= GAP_CLOSING_SHARE * one["contacts"]["gap"][i] / H
+        if np.abs(targets[i]).max() <= max(one["settings"]["tolerance"] * 10.0 * H, NEGLIGIBLE_SLOP_SHARE * SLOP / H):
             targets[i] = 0.0
     return targets
 
@@ -75,29 +80,31 @@ def test_each_contact_is_asked_for_what_the_formula_says(slots, above):
     n = len(slots)
     gaps = np.random.default_rng(n).uniform(-SLOP, SLOP, n)
     gaps[n // 2] += above
-    work = posed(slots, gaps, seed=n)
+    scratch = posed(slots, gaps, seed=n)
     v, w, alpha = (0.1, -0.2, 0.3), (0.7, -1.1, 0.4), (2.0, 0.5, -1.0)
-    _aim(n, v, w, alpha, EVEN, H, None, work)
+    _aim(n, v, w, alpha, EVEN, H, None, scratch)
     # Sums of a dozen products of size at most |v| + |ω| r or h/2 (|ω|² + |α|) r: 5; 1/h times a gap: 0.03.
-    np.testing.assert_allclose(work[0]["target"][:n], expected(work, n, v, w, alpha), rtol=0, atol=60 * EPS)
-    assert not work[0]["target"][n:].any()
+    np.testing.assert_allclose(
+        scratch[0]["contacts"]["target"][:n], expected(scratch, n, v, w, alpha), rtol=0, atol=60 * EPS
+    )
+    assert not scratch[0]["contacts"]["target"][n:].any()
 
 
 def test_a_body_at_rest_is_asked_for_nothing():
-    work = posed([0, 1, 4, 5], np.full(4, -SLOP / 2), seed=0)
-    work["target"] = 7.0
+    scratch = posed([0, 1, 4, 5], np.full(4, -SLOP / 2), seed=0)
+    scratch["contacts"]["target"] = 7.0
     none = (0.0, 0.0, 0.0)
-    _aim(4, none, none, none, EVEN, H, None, work)
-    assert not work[0]["target"][:4].any()
-    assert (work[0]["target"][4:] == 7.0).all()
+    _aim(4, none, none, none, EVEN, H, None, scratch)
+    assert not scratch[0]["contacts"]["target"][:4].any()
+    assert (scratch[0]["contacts"]["target"][4:] == 7.0).all()
 
 
 def test_what_is_next_to_nothing_is_not_asked_for():
     """A turn that gains a contact less than `NEGLIGIBLE_SLOP_SHARE` slops in the step."""
-    work = posed([0, 1, 4, 5], np.zeros(4), seed=1)
+    scratch = posed([0, 1, 4, 5], np.zeros(4), seed=1)
     slow = (0.0, 1e-2 * NEGLIGIBLE_SLOP_SHARE * SLOP / H**2, 0.0)
-    _aim(4, (0.0, -1.0, 0.0), slow, (0.0, 0.0, 0.0), EVEN, H, None, work)
-    assert not work[0]["target"].any()
+    _aim(4, (0.0, -1.0, 0.0), slow, (0.0, 0.0, 0.0), EVEN, H, None, scratch)
+    assert not scratch[0]["contacts"]["target"].any()
 
 
 # --- impacts -------------------------------------------------------------------------------------------------------
@@ -126,12 +133,16 @@ def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_sp
 
     One that pushed in the last stage, and is no faster than that may leave it, has hit nothing: it is stopped.
     """
-    work, n = posed(list(range(len(contacts))), [gap for _, gap, _ in contacts], seed=0), len(contacts)
-    work["restitution"], work["target"], work["acceleration"] = restitution, 7.0, residue / H
-    work["speed"][0, :n] = [speed for speed, _, _ in contacts]
-    work["approach"] = max(0.0, *(-speed for speed, _, _ in contacts))
-    memory = np.zeros((1, wall_memory_size(work["slot"].shape[1])))
-    memory[0, WALL_MEMORY_HEAD + work["slot"].shape[1] :: 3][:n] = [pushed for _, _, pushed in contacts]
+    scratch, n = posed(list(range(len(contacts))), [gap for _, gap, _ in contacts], seed=0), len(contacts)
+    scratch["body"]["restitution"], scratch["contacts"]["target"], scratch["body"]["acceleration"] = (
+        restitution,
+        7.0,
+        residue / H,
+    )
+    scratch["contacts"]["speed"][0, :n] = [speed for speed, _, _ in contacts]
+    scratch["contacts"]["approach"] = max(0.0, *(-speed for speed, _, _ in contacts))
+    memory = np.zeros((1, wall_memory_size(scratch["contacts"]["slot"].shape[1])))
+    memory[0, WALL_MEMORY_HEAD + scratch["contacts"]["slot"].shape[1] :: 3][:n] = [pushed for _, _, pushed in contacts]
     slop_speed, goals, found = SLOP / H, [], NO_IMPACT
     for speed, gap, pushed in contacts:
         is_left_over = pushed and -speed <= residue
@@ -140,7 +151,7 @@ def test_an_impact_is_what_one_contact_of_it_is(contacts, restitution, bounce_sp
         if bounces or -speed > slop_speed + max(gap, 0.0) / H:
             found = max(found, RESIDUAL_APPROACH if is_left_over else TRUE_IMPACT)
             goals[-1] *= not is_left_over
-    assert _aim_impact(n, bounce_speed, slop_speed, H, memory, work) == found
+    assert _aim_impact(n, bounce_speed, slop_speed, H, memory, scratch) == found
     if found:
-        np.testing.assert_array_equal(work[0]["target"][:n], [(goal, 0.0, 0.0) for goal in goals])
-        assert (work[0]["target"][n:] == 7.0).all()
+        np.testing.assert_array_equal(scratch[0]["contacts"]["target"][:n], [(goal, 0.0, 0.0) for goal in goals])
+        assert (scratch[0]["contacts"]["target"][n:] == 7.0).all()

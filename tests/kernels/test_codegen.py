@@ -248,6 +248,29 @@ def test_a_view_of_an_array_in_a_record():
     assert sum_of_row(record_of()[0]) == grid(3, 4)[1].sum() + 4 + 4
 
 
+@kernel
+def write_inner(outer, i, j, value):
+    inner = outer.second
+    write_record(inner, i, j, value)
+    outer.first.scale = inner.scale + value
+    return sum_of_row(outer.second)
+
+
+@given(index(3), index(4))
+def test_records_in_a_record(i, j):
+    """They are where NumPy has them, and another kernel takes one as any record."""
+    outer = np.zeros(1, [("n", np.int64), ("first", RECORD), ("second", RECORD)])
+    outer["first"], outer["second"] = record_of(2.0), record_of()
+    expected = grid(3, 4)
+    expected[i, j] = -3.0
+    assert write_inner(outer[0], i, j, -3.0) == expected[1].sum() + 4 + 4
+    assert (outer["second"]["grid"][0] == expected).all()
+    assert outer["second"]["n"][0] == i
+    assert (outer["first"]["grid"][0] == grid(3, 4)).all()
+    assert outer["first"]["scale"][0] == -2.5
+    assert (outer["first"]["n"][0], outer["n"][0]) == (7, 0)
+
+
 # --- ranges and variables ------------------------------------------------------------------------------------------
 
 

@@ -43,9 +43,9 @@ def assert_solved(problem, p, result):
     rows = p.shape[1]
     total, moment = np.zeros(3), np.zeros(3)
     for i in range(problem.n):
-        axes = problem.one["walls"][problem.one["slot"][i] // 8][:9].reshape(3, 3)[:rows]
+        axes = problem.one["scene"]["walls"][problem.one["contacts"]["slot"][i] // 8][:9].reshape(3, 3)[:rows]
         total += p[i] @ axes
-        moment += np.cross(problem.one["arm"][i], p[i] @ axes)
+        moment += np.cross(problem.one["contacts"]["arm"][i], p[i] @ axes)
     scale = np.abs(total).sum() + 1e-3
     np.testing.assert_allclose(v, np.array(problem.v) + total / problem.mass, atol=1e-13 * scale)
     np.testing.assert_allclose(L, np.array(problem.L) + moment, atol=1e-12 * scale)
@@ -118,7 +118,7 @@ def test_a_sliding_face_loses_mu_g():
     assert abs(v[1]) <= 1e-16
     assert np.abs(L).max() <= 1e-15
     # Friction at the floor tips the block forwards: the moment mu m g h * half height is carried by the normals.
-    moment = -(p[:, 0] * problem.one["arm"][:4, 0]).sum()
+    moment = -(p[:, 0] * problem.one["contacts"]["arm"][:4, 0]).sum()
     assert moment == pytest.approx(-mu * MASS * GRAVITY * H * SIZE[1], rel=1e-13)
 
 
@@ -126,7 +126,7 @@ def test_a_held_edge_turns_as_a_physical_pendulum():
     """Both ends of an edge hold: the gain of ω is m g h d / (I + m l²), about the edge."""
     problem = Problem(floor([0, 4]), (0, FALL, 0), (0, 0, 0), 5.0)
     p, (v, L, _, _, method) = problem.solve(TRY_STICKING)
-    arm = problem.one["arm"][0]
+    arm = problem.one["contacts"]["arm"][0]
     inertia = INERTIA[2] + MASS * (arm[0] ** 2 + arm[1] ** 2)
     gain = MASS * FALL * -arm[0] / inertia
     assert method == METHOD_DIRECT
@@ -141,13 +141,13 @@ def test_vertex_impact_is_that_of_the_course_notes(quat, friction):
     """J = -(1 + e) v_n / (1/m + n·(I⁻¹ (r x n)) x r), without friction."""
     e = 0.4
     problem = Problem([(0, 3)], (0.3, -2.0, 0.1), (0.5, -1.0, 0.7), 0.0, quat)
-    r, n = problem.one["arm"][0], np.array([0.0, 1.0, 0.0])
+    r, n = problem.one["contacts"]["arm"][0], np.array([0.0, 1.0, 0.0])
     inverse = np.linalg.inv(problem.inertia)
     v_n = n @ (np.array(problem.v) + np.cross(inverse @ problem.L, r))
     if v_n > 0.0:
         problem.v = (0.3, -2.0 - 2 * v_n, 0.1)
         v_n = n @ (np.array(problem.v) + np.cross(inverse @ problem.L, r))
-    problem.one["target"][0, 0] = -e * v_n
+    problem.one["contacts"]["target"][0, 0] = -e * v_n
     p, result = problem.solve(TRY_SLIDING, friction)
     expected = -(1 + e) * v_n / (1 / MASS + n @ np.cross(inverse @ np.cross(r, n), r))
     assert result[4] == METHOD_DIRECT
@@ -169,7 +169,7 @@ def test_rest_is_exact():
 def test_a_flat_drop_is_bit_symmetric(mode, friction):
     """Four equal impulses, with or without friction, and no rotation."""
     problem = Problem(floor(FACE), (0, -2.0, 0), (0, 0, 0), 0.5 if friction else 0.0)
-    problem.one["target"][:4, 0] = 0.6
+    problem.one["contacts"]["target"][:4, 0] = 0.6
     p, (v, L, _, _, method) = problem.solve(mode, friction)
     assert method == METHOD_DIRECT
     assert len(set(p[:, 0])) == 1
@@ -227,7 +227,7 @@ def test_shared_friction_on_a_tilted_face_keeps_force_and_moment():
         v, w = np.add(rng.normal(0, 0.008, 3), (0, FALL, 0)), rng.normal(0, 0.02, 3)
         problem = Problem(floor(FACE), v, w, 0.5, quat=(1, 5e-4, 0, 5e-4), tolerance=1e-6)
         p, result = problem.solve(TRY_STICKING)
-        if result[4] == METHOD_DIRECT and problem.one["mode"] == TRY_STICKING and (p[:, 0] > 0).all():
+        if result[4] == METHOD_DIRECT and problem.one["stage"]["mode"] == TRY_STICKING and (p[:, 0] > 0).all():
             held += 1
             assert_solved(problem, p, result)
     assert held > 100

@@ -86,5 +86,8 @@ def test_equal_coefficients_are_the_even_wall_to_the_last_bit(contacts, motion, 
 
 
 def test_undeclared_it_is_not_stored():
-    names = [set(Problem([(0, 0)], (0, 0, 0), (0, 0, 0), 0.5, ratio=ratio).work.dtype.names) for ratio in (None, 2.0)]
+    names = [
+        set(Problem([(0, 0)], (0, 0, 0), (0, 0, 0), 0.5, ratio=ratio).scratch["body"].dtype.names)
+        for ratio in (None, 2.0)
+    ]
     assert names[1] - names[0] == {"laws", "law_anisotropy"}

@@ -138,7 +138,7 @@ def test_no_gap_has_a_larger_third_derivative_than_its_bound(kind, seed, strengt
     y = tuple(tuple(part.tolist()) for part in np.split(world.state[0, :13], [3, 7, 10]))
     world.step(np.array([[[0.0, 0.0, 0.0, *torque]]]))  # binds the body
     left = 1.0 / (1.0 + np.linalg.norm(body.angvel))
-    bound = called(gap_jerk_bound, y, left, None, world.scratch[0][0])
+    bound = called(gap_jerk_bound, y, left, None, world.scratch[0]["body"][0])
     times = 0.5 * left * (1.0 - np.cos(np.pi * np.arange(49) / 48))
     for gap in gaps(body, turning(body, torque, times), normal):
         third = Chebyshev.fit(times, gap, 24).deriv(3)(times)

@@ -12,7 +12,7 @@ from physics.kernels.event_driven.workspace import make_motion
 from physics.kernels.state.layout import VERTEX_COUNT
 
 EPS = np.finfo(float).eps
-WORK = np.dtype([("mass", float), ("J", float, (3,))])
+BODY = np.dtype([("mass", float), ("J", float, (3,))])
 AXES = tuple(np.eye(3).ravel())
 
 
@@ -21,13 +21,13 @@ def solved(rows, pushes, asked, is_skew):
 
     The body has unit mass and unit moments of inertia: its acceleration is the force and the moment.
     """
-    work, motion = np.ones(1, WORK), make_motion(3, VERTEX_COUNT, False)
+    body, motion = np.ones(1, BODY), make_motion(3, VERTEX_COUNT, False)
     m = len(asked)
     one = motion.unknowns[0]
     one["row"][:m], one["row_moment"][:m] = rows[:, :3], rows[:, 3:]
     one["column_force"][:m], one["column_moment"][:m] = pushes[:, :3], pushes[:, 3:]
     one["rhs"][:m], one["is_skew"] = asked, is_skew
-    force, moment = solve_contact_forces(m, AXES, work[0], one)
+    force, moment = solve_contact_forces(m, AXES, body[0], one)
     return np.array([*force, *moment]), one["value"][:m].copy()
 
 

@@ -23,7 +23,10 @@ MU = 0.5
 def loaded(push, slip):
     """A face to which friction gives the share |slip| <= 1 of what it can, along a rigid motion: pushes, directions."""
     problem = Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU)
-    arms, axes = np.array(problem.one["arm"][:4]), np.array(problem.one["walls"][0][:9]).reshape(3, 3)
+    arms, axes = (
+        np.array(problem.one["contacts"]["arm"][:4]),
+        np.array(problem.one["scene"]["walls"][0][:9]).reshape(3, 3),
+    )
     p = push[:, None] * (axes[0] - MU * slip @ axes[1:])
     v = -p.sum(axis=0) / MASS
     w = -np.linalg.solve(problem.inertia, np.cross(arms, p).sum(axis=0))
@@ -32,7 +35,7 @@ def loaded(push, slip):
 
 def motion_of(centre, sense):
     """Unit directions (4, 2) along the tangents z, x in which the vertices go about a centre."""
-    arms = np.array(Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one["arm"][:4])
+    arms = np.array(Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one["contacts"]["arm"][:4])
     u = sense * np.stack([-(arms[:, 0] - centre[0]), arms[:, 2] - centre[1]], axis=1)  # ω x r along z and x
     return u / np.linalg.norm(u, axis=1)[:, None]
 
@@ -49,7 +52,7 @@ def test_a_face_holds_up_to_the_verge_of_turning_about_any_point(centre, sense, 
     problem = loaded(np.full(4, -MASS * FALL / 4), 0.95 * motion_of(centre, sense))
     p, (v, L, _, _, method) = problem.solve(mode)
     assert method == METHOD_DIRECT
-    assert problem.one["mode"] == TRY_STICKING
+    assert problem.one["stage"]["mode"] == TRY_STICKING
     # Sums of four products of impulses of 0.07 N s with arms of 3 m.
     assert np.abs(v).max() <= 1e-15
     assert np.abs(L).max() <= 1e-14
@@ -62,7 +65,7 @@ def test_a_face_slips_beyond_the_verge(centre, sense, mode):
     """A target 5 % beyond friction does not hold, whatever is tried first."""
     problem = loaded(np.full(4, -MASS * FALL / 4), 1.05 * motion_of(centre, sense))
     p, result = problem.solve(mode)
-    assert problem.one["mode"] != TRY_STICKING
+    assert problem.one["stage"]["mode"] != TRY_STICKING
     assert np.abs(result[0]).max() > 1e-4 or np.abs(result[1]).max() > 1e-4
     assert law_defect(problem, p) <= 1e-8
 
@@ -113,14 +116,14 @@ def test_one_contact_that_bounces_off_takes_another_along(bounces):
 @pytest.mark.parametrize("target_error_limit", [0.0, 1e-8])
 def test_contacts_hold_that_are_asked_to_move_apart_by_next_to_nothing(target_error_limit):
     """Targets away from the centre of the face are those of no rigid motion; what fits best is none at all."""
-    arms = np.array(Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one["arm"][:4])
+    arms = np.array(Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one["contacts"]["arm"][:4])
     target = np.zeros((4, 3))
     target[:, 1], target[:, 2] = 3e-9 * arms[:, 2], 3e-9 * arms[:, 0]  # at most 8e-9 m/s
     problem = Problem(floor(FACE), (0.001, FALL, 0), (0, 0, 0), MU, target=target, tolerance=1e-9)
-    problem.one["target_error_limit"] = target_error_limit
+    problem.one["stage"]["target_error_limit"] = target_error_limit
     _, (v, _, residual, _, _) = problem.solve(TRY_STICKING)
     assert residual <= 1e-9
-    assert (problem.one["mode"] == TRY_STICKING) == (target_error_limit > 0.0)
+    assert (problem.one["stage"]["mode"] == TRY_STICKING) == (target_error_limit > 0.0)
     assert np.abs(v).max() <= 1e-15 or not target_error_limit
 
 
@@ -128,32 +131,32 @@ def test_contacts_hold_that_are_asked_to_move_apart_by_next_to_nothing(target_er
 def test_eight_contacts_of_one_wall_are_solved_by_sweeps(mode):
     """A plate thinner than the slop touches with both its faces: more than lanes take."""
     problem = Problem(floor(range(8)), (0.3, FALL, 0.1), (0, 0.1, 0), MU)
-    problem.one["arm"][:8, 1] = -1.5
+    problem.one["contacts"]["arm"][:8, 1] = -1.5
     p, result = problem.solve(mode)
     assert_solved(problem, p, result)
 
 
 @kernel
-def begun(n, mu, u, w, inv_mass, K, work):
+def begun(n, mu, u, w, inv_mass, K, scratch):
     """Start of a face under new loads (`patch_start.cold_start_motion`), on the wall whose axes are x, y, z."""
     axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     body = FreeBody(axes, u, w, K, inv_mass)
-    return cold_start_motion(n, gather_patch(n, body, work), valid_lanes_mask(n), mu, body)
+    return cold_start_motion(n, gather_patch(n, body, scratch), valid_lanes_mask(n), mu, body)
 
 
 @pytest.mark.parametrize("n", [3, 4])
 def test_a_slip_without_spin_and_a_spin_about_the_centroid_lose_what_friction_takes(n):
     """The ellipsoid is exact along its axes: v0 - μP/m, and I (ω0 - ω) = μPρ with the root mean square ρ of arms."""
-    work = Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one
+    scratch = Problem(floor(FACE), (0, 0, 0), (0, 0, 0), MU).one
     arms = np.array([(-1.5, 2.0, 1.0), (-1.5, -1.0, 0.5), (-1.5, -1.0, -1.5), (-1.5, 0.0, 0.0)])[:n]
-    work["arm"][:n] = arms
+    scratch["contacts"]["arm"][:n] = arms
     push, inv_mass, spin = 0.06, 0.25, 3.0
     K = (0.2, 0.0, 0.0, 0.1, 0.0, 0.1)
-    va, vb, wn = begun(n, MU, (-push, 0.3, -0.4), (0.0, 0.0, 0.0), inv_mass, K, work)
+    va, vb, wn = begun(n, MU, (-push, 0.3, -0.4), (0.0, 0.0, 0.0), inv_mass, K, scratch)
     assert (va, vb, wn) == pytest.approx((0.3 * (1 - MU * push / 0.5), -0.4 * (1 - MU * push / 0.5), 0.0), rel=1e-13)
     centre = arms.mean(axis=0)
     rho = np.sqrt(((arms - centre)[:, 1:] ** 2).sum(axis=1).mean())
     about = (-push, spin * centre[2], -spin * centre[1])  # the centroid is at rest
-    va, vb, wn = begun(n, MU, about, (spin, 0.0, 0.0), inv_mass, K, work)
+    va, vb, wn = begun(n, MU, about, (spin, 0.0, 0.0), inv_mass, K, scratch)
     left = spin - MU * push / inv_mass * rho * K[0]
     assert (va, vb, wn) == pytest.approx((left * centre[2], -left * centre[1], left), abs=1e-13)

@@ -36,11 +36,11 @@ def found(bodies, places, rotations, walls=(), h=EVERYTHING):
     """(workspace, number of contacts) of bodies at rest at `places` with these attitudes (n, 3, 3)."""
     walls = parameters.wall_table(walls)
     many = make_bodies_workspace(len(bodies), walls, (), polyhedra_of(bodies), **SETTINGS)
-    many.bodies.work["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
-    many.bodies.work["dims"] = [body.dimensions for body in bodies]
-    many.bodies.work["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]
-    many.bodies.work["mass"] = many.bodies.work["acceleration"] = 1.0
-    many.bodies.work["slop"] = 1e-6 * many.bodies.work["radius"]
+    many.bodies.body["shape"] = [SHAPE_CODES[body.kind] for body in bodies]
+    many.bodies.body["dims"] = [body.dimensions for body in bodies]
+    many.bodies.body["radius"] = [body.bounding_radius(body.dimensions) for body in bodies]
+    many.bodies.body["mass"] = many.bodies.body["acceleration"] = 1.0
+    many.bodies.body["slop"] = 1e-6 * many.bodies.body["radius"]
     many.bodies.center[:] = many.bodies.state[:, :3] = places
     many.bodies.rotation[:] = np.reshape(rotations, (-1, 9))
     called(find_contacts, h, True, True, 0, None, many)
@@ -90,7 +90,7 @@ def test_the_normal_of_two_polyhedra_separates_them_most(seed, kinds):
     many, n = found(bodies, places, R)
     assert n > 0
     a, b = (corners(*each) for each in zip(bodies, places, R))
-    slop, size = many.bodies.work["slop"].max(), np.abs(np.concatenate([a, b])).max()
+    slop, size = many.bodies.body["slop"].max(), np.abs(np.concatenate([a, b])).max()
     true, normal, least = polyhedra.largest_separation(a, b), many.contacts.frame[0, :3], many.contacts.gap[:n].min()
     along = polyhedra.separation_along(-normal, a, b)
     np.testing.assert_allclose(many.contacts.frame[:n, :3], np.tile(normal, (n, 1)), atol=1e-15)
@@ -133,7 +133,7 @@ def test_contacts_of_disjoint_polyhedra_have_positive_gaps_only(seed, distance):
     if polyhedra.are_disjoint(a, b):
         assert (many.contacts.gap[:n] > 0).all()
     else:  # the last of what they touch with is 1e-9 of their size at most
-        assert many.contacts.gap[:n].min() <= 2 * many.bodies.work["slop"].max()
+        assert many.contacts.gap[:n].min() <= 2 * many.bodies.body["slop"].max()
 
 
 def test_stones_of_an_arch_touch_with_the_corners_of_their_joint():

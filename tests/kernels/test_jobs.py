@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from physics.compiler.decorators import kernel
-from physics.parallel.bound_call import Work, bound
+from physics.parallel.bound_call import BoundCall, bound
 
 
 class Pair(NamedTuple):
@@ -63,7 +63,7 @@ def pair_of(table) -> Pair:
 
 def test_what_is_no_argument_of_a_kernel_is_refused():
     with pytest.raises(TypeError):
-        Work([(0, ("text",))])
+        BoundCall([(0, ("text",))])
 
 
 @kernel

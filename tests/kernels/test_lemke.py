@@ -19,8 +19,8 @@ def solve(M, q, max_pivots=2000):
     M, q = np.array(M, float), np.array(q, float)
     shape, length = lemke_sizes(len(q))
     z = np.full(len(q), np.nan)
-    work = np.full(shape, np.nan), np.full(length, -99)
-    status, pivots = lemke(M, q, z, *work, max_pivots)
+    scratch = np.full(shape, np.nan), np.full(length, -99)
+    status, pivots = lemke(M, q, z, *scratch, max_pivots)
     return status, pivots, z
 
 

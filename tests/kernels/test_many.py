@@ -41,9 +41,9 @@ def rotation(rng) -> np.ndarray:
 def blocks(places, rotations, halves):
     """Workspace with blocks at rest, placed for the narrow phase."""
     many = make_bodies_workspace(len(places), np.zeros((0, at.WALL_SIZE)), **SETTINGS)
-    many.bodies.work["shape"], many.bodies.work["mass"], many.bodies.work["dims"] = at.BLOCK, 1.0, halves
-    many.bodies.work["radius"] = np.linalg.norm(halves, axis=-1)
-    many.bodies.work["slop"] = 1e-6 * many.bodies.work["radius"]
+    many.bodies.body["shape"], many.bodies.body["mass"], many.bodies.body["dims"] = at.BLOCK, 1.0, halves
+    many.bodies.body["radius"] = np.linalg.norm(halves, axis=-1)
+    many.bodies.body["slop"] = 1e-6 * many.bodies.body["radius"]
     many.bodies.center[:] = many.bodies.state[:, :3] = places
     many.bodies.rotation[:] = np.reshape(rotations, (-1, 9))
     return many
@@ -63,7 +63,7 @@ def spread_out(seed, count, ratio, stretch):
 def pairs_in_the_order_of_bodies(many):
     """All pairs of bodies whose boxes overlap, compared one by one: a reference for `find_pairs`."""
     R, count = np.abs(many.bodies.rotation.reshape(-1, 3, 3)), len(many.bodies.center)
-    extent = np.einsum("bij,bj->bi", R, many.bodies.work["dims"]) + many.bodies.work["slop"][:, None]
+    extent = np.einsum("bij,bj->bi", R, many.bodies.body["dims"]) + many.bodies.body["slop"][:, None]
     return [
         (a, b)
         for a, b in itertools.combinations(range(count), 2)
@@ -112,7 +112,7 @@ def test_a_box_that_is_not_finite_is_no_reason_to_read_beyond_the_columns(value)
 def separation(direction, many) -> float:
     """Signed distance of the two blocks along a unit direction from the first to the second [m]."""
     R = many.bodies.rotation.reshape(2, 3, 3)
-    reach = np.abs(np.einsum("bij,i->bj", R, direction)) * many.bodies.work["dims"]
+    reach = np.abs(np.einsum("bij,i->bj", R, direction)) * many.bodies.body["dims"]
     return direction @ (many.bodies.center[1] - many.bodies.center[0]) - reach.sum()
 
 
@@ -126,7 +126,7 @@ def test_the_normal_of_two_blocks_separates_them_most(seed, distance):
     halves = rng.uniform(0.2, 1.0, (2, 3))
     many = blocks([np.zeros(3), distance * direction], [rotation(rng), rotation(rng)], halves)
     h = 10.0  # the margin is the way that the loads could bring the blocks in h: gaps up to a m/s² h² = 100 m count
-    many.bodies.work["acceleration"] = 1.0
+    many.bodies.body["acceleration"] = 1.0
     called(find_contacts, h, None, None, 0, None, many)
     n = many.counts[NUM_CONTACTS]
     assert n > 0
@@ -233,7 +233,7 @@ def test_no_contact_is_lost_where_a_face_is_tilted_by_some_slops(yaw, shift, til
         cross = np.array([[0, -z, 0], [z, 0, -x], [0, x, 0]])  # of the axis (x, 0, z)
         tipped = (np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross) @ turned
         many = blocks([[0, 0, 0], [shift[0], 1.0, shift[1]]], [np.eye(3), tipped], np.full((2, 3), 0.5))
-        many.bodies.work["acceleration"] = acceleration
+        many.bodies.body["acceleration"] = acceleration
         called(find_contacts, h, None, None, 0, None, many)
         n = many.counts[NUM_CONTACTS]
         return n, many.contacts.frame[:n, :3]

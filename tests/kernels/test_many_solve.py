@@ -175,8 +175,8 @@ def with_resting(one: BodiesWorkspace, n: int, bodies: int, resting: int) -> Bod
     """A problem of so many contacts and bodies, and beside it bodies that rest on the wall by one contact each."""
     many = make_bodies_workspace(bodies + resting, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        many.bodies.work[name] = 1.0
-        many.bodies.work[name][:bodies] = one.bodies.work[name]
+        many.bodies.body[name] = 1.0
+        many.bodies.body[name][:bodies] = one.bodies.body[name]
     many.bodies.inv_mass[:], many.bodies.inv_inertia[:] = 1.0, (1, 0, 0, 1, 0, 1)
     for name in ("inv_mass", "inv_inertia", "twist"):
         getattr(many.bodies, name)[:bodies] = getattr(one.bodies, name)
@@ -211,7 +211,7 @@ def crowd(bodies: int) -> tuple[BodiesWorkspace, int]:
     one, _ = pile(0, bodies, bodies, 0.3)
     many = make_bodies_workspace(bodies, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        many.bodies.work[name] = one.bodies.work[name]
+        many.bodies.body[name] = one.bodies.body[name]
     pairs = [(0, -1), *((a, b) for a in range(bodies) for b in range(a))]
     n = len(pairs)
     for name in ("inv_mass", "inv_inertia", "twist"):
@@ -287,9 +287,9 @@ def test_islands_are_solved_as_if_they_were_alone():
     two, _ = pile(4, 4, 4, 0.5)
     both = make_bodies_workspace(8, np.zeros((1, at.WALL_SIZE)), **SETTINGS)
     for name in ("mass", "radius"):
-        both.bodies.work[name][:4], both.bodies.work[name][4:] = (
-            one.bodies.work[name],
-            two.bodies.work[name],
+        both.bodies.body[name][:4], both.bodies.body[name][4:] = (
+            one.bodies.body[name],
+            two.bodies.body[name],
         )
     for name in ("inv_mass", "inv_inertia", "twist"):
         column = getattr(both.bodies, name)

@@ -186,13 +186,13 @@ def test_normal_fallback_is_the_frictionless_twin():
     padded = np.full((N_MAX, N_MAX), np.nan)
     padded[:4, :4] = W[::3, ::3]
     p = np.full(N_MAX, 5.0)
-    work = np.full(floats, np.nan), np.full(integers, -9)
+    scratch = np.full(floats, np.nan), np.full(integers, -9)
     velocity = np.append(b[::3], np.full(N_MAX - 4, np.nan))
-    assert solve_normal_lcp(padded, velocity, 4, p, *work, 100)[0] == LCP_SOLVED
+    assert solve_normal_lcp(padded, velocity, 4, p, *scratch, 100)[0] == LCP_SOLVED
     u = W[::3, ::3] @ p[:4] + b[::3]
     assert np.abs(np.minimum(u, p[:4])).max() < 1e-13
     assert (p[4:] == 5.0).all()
     assert np.abs(u - (W @ solve(W, b, 0.0)[2] + b)[::3]).max() < 1e-13
     before = p.copy()
-    assert solve_normal_lcp(padded, velocity, 4, p, *work, 1)[0] == LCP_PIVOT_LIMIT
+    assert solve_normal_lcp(padded, velocity, 4, p, *scratch, 1)[0] == LCP_PIVOT_LIMIT
     assert np.array_equal(p, before)

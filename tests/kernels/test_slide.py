@@ -37,7 +37,10 @@ def pivoting(held, sense, mu=0.5):
     The free motion is the one that these impulses lead there from.
     """
     problem = Problem(floor(FACE), (0, 0, 0), (0, 0, 0), mu, tolerance=TOLERANCE)
-    arms, axes = np.array(problem.one["arm"][:4]), np.array(problem.one["walls"][0][:9]).reshape(3, 3)
+    arms, axes = (
+        np.array(problem.one["contacts"]["arm"][:4]),
+        np.array(problem.one["scene"]["walls"][0][:9]).reshape(3, 3),
+    )
     w = np.array([0, 0.05 * sense, 0])
     v = -np.cross(w, arms[held])
     push = -FALL * MASS / 4
@@ -60,7 +63,7 @@ def test_a_face_turns_about_a_vertex(held, sense):
     p, (_, _, residual, _, method) = problem.solve()
     assert method == METHOD_DIRECT
     assert residual <= TOLERANCE
-    assert problem.one["mode"] == TRY_MIXED
+    assert problem.one["stage"]["mode"] == TRY_MIXED
     np.testing.assert_allclose(p, expected, atol=impulse_error(problem))
 
 
@@ -200,7 +203,7 @@ def test_two_contacts_that_slid_are_not_asked_to_hold_first():
     p, (_, _, _, _, method) = problem.solve(TRY_STICKING)
     assert method == METHOD_DIRECT
     np.testing.assert_allclose(np.hypot(p[:, 1], p[:, 2]), 0.5 * p[:, 0], rtol=1e-12)  # they slide
-    assert problem.one["mode"] == TRY_SLIDING
+    assert problem.one["stage"]["mode"] == TRY_SLIDING
 
 
 @settings(max_examples=300, deadline=None)
@@ -251,10 +254,10 @@ def test_a_contact_that_may_not_hold_and_cannot_slide_is_lost():
 def test_blocks_of_the_wall_frame_are_those_of_the_dense_matrix():
     problem = Problem(floor([0, 5]), (0, 0, 0), (0, 0, 0), 0.5, quat=(0.9, 0.2, -0.3, 0.1))
     W, _ = problem.matrices()
-    axes = np.array(problem.one["walls"][0][:9]).reshape(3, 3)
+    axes = np.array(problem.one["scene"]["walls"][0][:9]).reshape(3, 3)
     inverse = axes @ np.linalg.inv(problem.inertia) @ axes.T
     K = tuple(inverse[i, j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
-    r, s = (tuple(axes @ problem.one["arm"][i]) for i in range(2))
+    r, s = (tuple(axes @ problem.one["contacts"]["arm"][i]) for i in range(2))
     # Sums of products of size 1, a dozen roundings.
     np.testing.assert_allclose(
         np.reshape(delassus_block(r, s, 1 / problem.mass, 1.0, K), (3, 3)), W[:3, 3:], atol=5e-15

@@ -28,7 +28,7 @@ SHAPES = {
 @kernel
 def safe_time_of(y, horizon, scratch):
     """(bound of |ω|, gap, safe time) of a body and the first wall."""
-    spin = spin_bound(y[1], y[3], horizon, None, scratch[0])
+    spin = spin_bound(y[1], y[3], horizon, None, scratch[0].body)
     gap, t = safe_advance(y, 0, horizon, spin, None, scratch[0])
     return spin, gap, t
 
@@ -55,8 +55,8 @@ def test_the_distance_of_two_bodies_is_a_bound_that_falls_short_by_a_tenth_at_mo
     many = physics.World(scene).scratch[0]
     has_hulls = True if "hull" in (first, second) else None
     for k, body in enumerate((a, b)):
-        many.bodies.work[k]["shape"] = {"block": 0, "sphere": SPHERE, "ellipsoid": 2, "hull": HULL}[(first, second)[k]]
-        many.bodies.work[k]["dims"] = _dims(body)
+        many.bodies.body[k]["shape"] = {"block": 0, "sphere": SPHERE, "ellipsoid": 2, "hull": HULL}[(first, second)[k]]
+        many.bodies.body[k]["dims"] = _dims(body)
     rng = np.random.default_rng(3)
     for k in range(12):
         R, S = (truth.Rotation.random(random_state=rng.integers(1 << 30)).as_matrix() for _ in range(2))

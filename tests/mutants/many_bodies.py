@@ -120,7 +120,7 @@ SOLVER = [
         "solver-budget",
         "Elimination goes on beyond the products that it is allowed.",
         "solver/minimum_degree.py",
-        "        if work > most:\n            return -1\n",
+        "        if cost > most:\n            return -1\n",
         "",
         "kernels/test_many.py::test_elimination_ends_where_it_takes_more_products_than_are_allowed",
     ),

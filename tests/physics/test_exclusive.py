@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import physics
-from physics.parallel.bound_call import Work
+from physics.parallel.bound_call import BoundCall
 from physics.parallel.exclusive import _Entry, _Flag, exclusive
 from tests.tiers.sweep import sweep
 
@@ -125,7 +125,7 @@ def test_a_world_is_free_after_an_error(monkeypatch):
     prepared()
     with monkeypatch.context() as patch:
         patch.setattr(prepared, "_perform", lambda: True)
-        patch.setattr(Work, "raise_again", lambda work: 1 / 0)
+        patch.setattr(BoundCall, "raise_again", lambda call: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             prepared()
     assert not world.is_in_use

@@ -193,7 +193,7 @@ world = physics.World(physics.Scene([body], effects=eval(sys.argv[1])), dt=0.01)
 world.step()
 names = ["field_load", "hold_loads", "drag", "buoyancy", "_wet_block", "spring", "_gust", "magnus", "push"]
 found = [name for name in names if any(name in function for function in linked)]
-print(json.dumps({"names": found, "members": list(world.scratch[0].dtype.names)}))
+print(json.dumps({"names": found, "members": list(world.scratch[0]["body"].dtype.names)}))
 """
 )
 

@@ -222,7 +222,7 @@ def test_laws_without_strength_leave_every_bit_and_undeclared_ones_are_not_store
     assert np.array_equal(runs[0].memory, runs[1].memory)
     assert np.array_equal(runs[0].report_table, runs[1].report_table)
     assert runs[1].params.shape[1] == runs[0].params.shape[1] + 3
-    names = [set(run.scratch[0].dtype.names) for run in runs]
+    names = [set(run.scratch[0]["body"].dtype.names) for run in runs]
     assert names[1] - names[0] == {"laws", "law_tangential", "law_rolling", "law_spin"}
     assert runs[0].plan.laws == ()
 

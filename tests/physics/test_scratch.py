@@ -16,8 +16,7 @@ from physics import scenes
 
 # What scratch says of the scene, not of a step.
 GIVEN = {
-    "tolerance", "sweeps", "splits", "mean_slip", "rest_share", "features", "feature_bits", "walls", "relative_slop",
-    "is_sequential", "settings",
+    "settings", "scene", "walls", "relative_slop", "is_sequential",
 }  # fmt: skip
 
 # Anything: what is not a number shows in whatever it gets into; 1 is in range of whatever an integer counts.
@@ -25,9 +24,11 @@ ANY_NUMBER, ANY_COUNT = np.nan, 1
 
 
 def spoil_record(record: np.ndarray) -> None:
-    """Write over every field that a step has to set itself."""
+    """Write over every field that a step has to set itself, also in the groups of a workspace."""
     for name in record.dtype.names:
-        if name not in GIVEN:
+        if record.dtype[name].names and name not in GIVEN:
+            spoil_record(record[name])
+        elif name not in GIVEN:
             record[name] = ANY_NUMBER if record.dtype[name].base.kind == "f" else ANY_COUNT
 
 

@@ -212,8 +212,8 @@ def test_what_a_spring_between_bodies_costs_is_stored_only_where_there_is_one():
     one_way = physics.World(physics.Scene(PAIR, effects=[physics.Spring()]))
     both = physics.World(physics.Scene(PAIR, effects=[physics.Spring(), tied()]))
     assert both.params.shape[1] == one_way.params.shape[1] + 17
-    assert {"middle", "load_linkedspring_1x17"} <= set(both.scratch[0].work.dtype.names)
-    assert not {"middle", "load_linkedspring_1x17"} & set(one_way.scratch[0].dtype.names)
+    assert {"middle", "load_linkedspring_1x17"} <= set(both.scratch[0].body.dtype.names)
+    assert not {"middle", "load_linkedspring_1x17"} & set(one_way.scratch[0]["body"].dtype.names)
     assert one_way.plan.scheme.name != "springs between bodies"
     assert "all bodies at once" in both.plan.explain()
 

@@ -130,6 +130,12 @@ def array_in_record(context, builder, record_type, record, name):
     )
 
 
+def record_in_record(context, builder, record_type, record, name):
+    """Record in a field of a record: its address."""
+    inner = context.get_data_type(record_type.typeof(name))
+    return cgutils.get_record_member(builder, record, record_type.offset(name), inner)
+
+
 def signature(key, context, args) -> typing.Signature | None:
     """Signature of `a[index]` or `a[index] = number` for an element, or None."""
     if key is operator.getitem and _is_element(*args):

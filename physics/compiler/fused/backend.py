@@ -96,7 +96,9 @@ def is_none(value) -> bool:
 
 
 def member(group, name: str):
-    """A member of a named tuple, or the type of one in the type of a named tuple."""
+    """A member of a named tuple, or the type of one in the type of a named tuple or of a record."""
+    if isinstance(group, types.Record):
+        return group.typeof(name)
     return group.types[group.fields.index(name)] if isinstance(group, types.BaseNamedTuple) else getattr(group, name)
 
 

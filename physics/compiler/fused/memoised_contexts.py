@@ -26,7 +26,7 @@ from numba.extending import models, register_model
 
 from physics.compiler.fused.ablation import is_on
 from physics.compiler.fused.argument_passing import Arguments
-from physics.compiler.fused.array_elements import array_in_record
+from physics.compiler.fused.array_elements import array_in_record, record_in_record
 from physics.compiler.fused.calling_convention import KernelCallConv, call_kernel
 from physics.compiler.fused.folding_builder import KernelBuilder
 from physics.compiler.fused.operation_table import lowering_of, signature_of
@@ -195,8 +195,11 @@ class MemoisedTarget(CPUContext):
 
         def get_getattr(self, typ, attr):
             """Return the function that reads a member of a value."""
-            if isinstance(typ, types.Record) and isinstance(typ.typeof(attr), types.NestedArray):
+            member = typ.typeof(attr) if isinstance(typ, types.Record) else None
+            if isinstance(member, types.NestedArray):
                 return array_in_record
+            if isinstance(member, types.Record):
+                return record_in_record
             return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):

@@ -63,7 +63,7 @@ def is_none(value) -> bool:
 
 
 def member(group, name: str):
-    """A member of a named tuple."""
+    """A member of a named tuple or of a record."""
     return getattr(group, name)
 
 

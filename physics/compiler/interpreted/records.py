@@ -11,13 +11,18 @@ import numpy as np
 
 
 class Record:
-    """Record of an array: numbers are read and written in the array, array fields are views of it."""
+    """Record of an array: numbers are read and written in the array; array fields are views of it, records records."""
 
     __slots__ = ("_record", "_views", "dtype")
 
     def __init__(self, record: np.void):
         self._record, self.dtype = record, record.dtype
-        self._views = {name: record[name] for name in record.dtype.names if record.dtype[name].shape}
+        self._views = {name: records_of(record[name]) for name in record.dtype.names if _is_part(record.dtype[name])}
+
+
+def _is_part(dtype: np.dtype) -> bool:
+    """True for the type of an array or of a record, False for that of a number."""
+    return bool(dtype.shape or dtype.names)
 
 
 def _number(name: str) -> property:
@@ -40,7 +45,7 @@ def _view(name: str) -> property:
 @cache
 def _class_of(dtype: np.dtype) -> type:
     """Class of the records of a type."""
-    fields = {name: _view(name) if dtype[name].shape else _number(name) for name in dtype.names}
+    fields = {name: _view(name) if _is_part(dtype[name]) else _number(name) for name in dtype.names}
     return type("Record", (Record,), {"__slots__": (), **fields})
 
 

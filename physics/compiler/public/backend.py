@@ -94,7 +94,9 @@ def is_none(value) -> bool:
 
 
 def member(group, name: str):
-    """A member of a named tuple, or the type of one in the type of a named tuple."""
+    """A member of a named tuple, or the type of one in the type of a named tuple or of a record."""
+    if isinstance(group, types.Record):
+        return group.typeof(name)
     return member_type(group, name) if isinstance(group, types.Type) else getattr(group, name)
 
 

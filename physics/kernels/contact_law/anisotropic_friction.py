@@ -46,51 +46,52 @@ def stretched_frame(K, u, w, k):
     )
 
 
-def _as_assembled(n, work):
+def _as_assembled(n, scratch):
     return None
 
 
 @if_law((LAW_ANISOTROPY,), _as_assembled)
-def stretch_tangents(n, work):
-    """Stretch the rows of tangent 2 in the contact problem that is assembled in `work`, and its impulses with them."""
-    k = friction_ratio(work)
+def stretch_tangents(n, scratch):
+    """Stretch the rows of tangent 2 in the contact problem assembled in `scratch`, and its impulses with them."""
+    contacts = scratch.contacts
+    k = friction_ratio(scratch.body)
     for i in range(n):
         r = 3 * i + 2
         for c in range(3):
-            work.frame[r, c] *= k
-            work.angular[r, c] *= k
-            work.response[r, c] *= k
-        work.bias[r] *= k
-        work.impulse[r] /= k
+            contacts.frame[r, c] *= k
+            contacts.angular[r, c] *= k
+            contacts.response[r, c] *= k
+        contacts.bias[r] *= k
+        contacts.impulse[r] /= k
         for s in range(3 * n):
-            work.delassus[r, s] *= k
-            work.delassus[s, r] *= k
+            contacts.delassus[r, s] *= k
+            contacts.delassus[s, r] *= k
 
 
 @if_law((LAW_ANISOTROPY,), _as_assembled)
-def unstretch_tangents(n, work):
+def unstretch_tangents(n, scratch):
     """The impulses along the unit tangents again."""
-    k = friction_ratio(work)
+    k = friction_ratio(scratch.body)
     for i in range(n):
-        work.impulse[3 * i + 2] *= k
+        scratch.contacts.impulse[3 * i + 2] *= k
 
 
-def _as_it_is(vector, axes, work):
+def _as_it_is(vector, axes, body):
     return vector
 
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
-def unstretch_force(f, axes, work):
+def unstretch_force(f, axes, body):
     """S⁻¹ f of a force f, whose size along the wall is then compared with μ1 times the push; `axes` are the wall's."""
-    k = friction_ratio(work)
+    k = friction_ratio(body)
     s = (1.0 / k - 1.0) * qt.dot(axes[2], f)
     return f[0] + s * axes[2][0], f[1] + s * axes[2][1], f[2] + s * axes[2][2]
 
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
-def sliding_direction(d, axes, work):
+def sliding_direction(d, axes, body):
     """Vector S² d/|S d| for sliding along the unit vector d: friction is -μ1 f_n times it; d on an even wall."""
-    k = friction_ratio(work)
+    k = friction_ratio(body)
     a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)
     size = math.sqrt(a * a + b * b)
     if not size > 0.0:

@@ -67,21 +67,25 @@ def _along(x, s, n):
     return x[0] + s * n[0], x[1] + s * n[1], x[2] + s * n[2]
 
 
-def _halves(n, y, h, offset_frame, work):
+def _halves(n, y, h, offset_frame, scratch):
     return 0.5 * h, 0.5 * h
 
 
 @if_law((LAW_STIFFNESS,), _halves)
-def split_stage_by_theta(n, y, h, offset_frame, work):
+def split_stage_by_theta(n, y, h, offset_frame, scratch):
     """Lengths (1 - θ) h and θ h of the drifts before and after the impulses [s]."""
+    body = scratch.body
     q = y[1]
-    place_arms(n, qt.to_matrix(q), offset_frame, work)
-    R = qt.to_matrix(principal_attitude(q, work, offset_frame))
-    w = n / work.mass
+    place_arms(n, qt.to_matrix(q), offset_frame, scratch)
+    R = qt.to_matrix(principal_attitude(q, body, offset_frame))
+    w = n / body.mass
     for i in range(n):
-        m = qt.cross(contact_arm(work, i), wall_normal(work.walls, wall_of(work.slot[i], work)))
-        w += qt.dot(m, apply_inv_inertia(R, m, work.J))
-    rate = max(math.sqrt(contact_stiffness(work) * w), contact_damping(work) * w)
+        m = qt.cross(
+            contact_arm(scratch.contacts, i),
+            wall_normal(scratch.scene.walls, wall_of(scratch.contacts.slot[i], scratch.scene)),
+        )
+        w += qt.dot(m, apply_inv_inertia(R, m, body.J))
+    rate = max(math.sqrt(contact_stiffness(body) * w), contact_damping(body) * w)
     theta = max(0.5, 1.0 - 1.0 / (rate * h))
     return (1.0 - theta) * h, theta * h
 
@@ -91,104 +95,108 @@ def _no_aim(*arguments):
 
 
 @if_law((LAW_STIFFNESS,), _no_aim)
-def set_spring_targets(n, x, motion, before, after, offset_frame, work):
+def set_spring_targets(n, x, motion, before, after, offset_frame, scratch):
     """Targets along the normals, and the γ of the stage, instead of `target_velocity.set_resting_targets`.
 
     x and `motion` (`StageMotion`) are those of the body between the drifts of `before` and `after`, before the
-    impulses; `work.gap` is that at the start.
+    impulses; `contacts.gap` is that at the start.
     """
+    scene, body, contacts = scratch.scene, scratch.body, scratch.contacts
     R, v, w, alpha = motion
     h = before + after
-    k, c = contact_stiffness(work), contact_damping(work)
+    k, c = contact_stiffness(body), contact_damping(body)
     theta = after / h
     D = theta * (after * k + c)
-    work.give = 1.0 / (h * D)
-    dims = (work.dims[0], work.dims[1], work.dims[2])
+    body.give = 1.0 / (h * D)
+    dims = (body.dims[0], body.dims[1], body.dims[2])
     is_turning = qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN
     for i in range(n):
-        wall = wall_of(work.slot[i], work)
-        normal = wall_normal(work.walls, wall)
+        wall = wall_of(contacts.slot[i], scene)
+        normal = wall_normal(scene.walls, wall)
         r, rate = contact_arm_and_rate(
-            work.shape, dims, R, w, normal, feature_of(work.slot[i], work), offset_frame, work
+            body.shape, dims, R, w, normal, feature_of(contacts.slot[i], scene), offset_frame, body
         )
         gain = 0.0
         if is_turning:
             gain = qt.dot(normal, qt.cross(w, rate)) + qt.dot(normal, qt.cross(alpha, r))
         speed = qt.dot(normal, v) + qt.dot(normal, qt.cross(w, r)) - before * gain
-        gap = feature_gap(work.slot[i], x, R, offset_frame, work) + 0.5 * after * after * gain
-        push = k * (theta * gap + (1.0 - theta) * min(work.gap[i], 0.0))
+        gap = feature_gap(contacts.slot[i], x, R, offset_frame, scratch) + 0.5 * after * after * gain
+        push = k * (theta * gap + (1.0 - theta) * min(contacts.gap[i], 0.0))
         push += c * (theta * after * gain + (1.0 - theta) * speed)
-        work.target[i, 0] = -push / D
-        work.end_gap[i] = gap
+        contacts.target[i, 0] = -push / D
+        contacts.end_gap[i] = gap
 
 
 @if_law((LAW_STIFFNESS,), _no_aim)
-def predict_end_gaps(n, v, w, after, work):
-    """Gaps at the end of the stage into `work.end_gap`, from the velocities after the impulses."""
+def predict_end_gaps(n, v, w, after, scratch):
+    """Gaps at the end of the stage into `contacts.end_gap`, from the velocities after the impulses."""
+    contacts = scratch.contacts
     for i in range(n):
-        normal = wall_normal(work.walls, wall_of(work.slot[i], work))
-        work.end_gap[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(work, i))))
+        normal = wall_normal(scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene))
+        contacts.end_gap[i] += after * (qt.dot(normal, v) + qt.dot(normal, qt.cross(w, contact_arm(contacts, i))))
 
 
-def _as_it_ends(n, y, end, h, offset_frame, report, work):
+def _as_it_ends(n, y, end, h, offset_frame, report, scratch):
     return end
 
 
 @inlined
-def _lifted(n, x, R, share, offset_frame, work):
+def _lifted(n, x, R, share, offset_frame, scratch):
     """Position x moved out of the walls until no point is deeper than `share` of its spring's due depth."""
-    least = NEGLIGIBLE_SLOP_SHARE * work.slop
+    contacts = scratch.contacts
+    least = NEGLIGIBLE_SLOP_SHARE * scratch.body.slop
     for i in range(n):
-        lift = share * min(work.end_gap[i], 0.0) - feature_gap(work.slot[i], x, R, offset_frame, work)
+        lift = share * min(contacts.end_gap[i], 0.0) - feature_gap(contacts.slot[i], x, R, offset_frame, scratch)
         if lift > least:
-            x = _along(x, lift, wall_normal(work.walls, wall_of(work.slot[i], work)))
+            x = _along(x, lift, wall_normal(scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene)))
     return x
 
 
 @inlined
-def _work_of_loads(y, end, h, offset_frame, work):
+def _work_of_loads(y, end, h, offset_frame, body):
     """Work of the held loads from y to `end`, and loss of kinetic energy [J]."""
-    a, T, v, L = work.free_acceleration, work.torque, end[2], end[3]
+    a, T, v, L = body.free_acceleration, body.torque, end[2], end[3]
     d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
-    lost = kinetic_energy(y[1], y[2], y[3], work, offset_frame) - kinetic_energy(end[1], v, L, work, offset_frame)
+    lost = kinetic_energy(y[1], y[2], y[3], body, offset_frame) - kinetic_energy(end[1], v, L, body, offset_frame)
     if T[0] != 0.0 or T[1] != 0.0 or T[2] != 0.0:
-        first, last = angular_velocity(y[1], y[3], work, offset_frame), angular_velocity(end[1], L, work, offset_frame)
+        first, last = angular_velocity(y[1], y[3], body, offset_frame), angular_velocity(end[1], L, body, offset_frame)
         turn = 0.5 * (first[0] + last[0]), 0.5 * (first[1] + last[1]), 0.5 * (first[2] + last[2])
         lost += h * (T[0] * turn[0] + T[1] * turn[1] + T[2] * turn[2])
-    return lost + work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+    return lost + body.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
 
 
 @inlined
-def _stored(n, x, R, offset_frame, work):
+def _stored(n, x, R, offset_frame, scratch):
     """Energy of the springs at x [J]."""
     stored = 0.0
     for i in range(n):
-        gap = min(feature_gap(work.slot[i], x, R, offset_frame, work), 0.0)
-        stored += 0.5 * contact_stiffness(work) * gap * gap
+        gap = min(feature_gap(scratch.contacts.slot[i], x, R, offset_frame, scratch), 0.0)
+        stored += 0.5 * contact_stiffness(scratch.body) * gap * gap
     return stored
 
 
 @inlined
-def _without_excess(y, end, excess, h, offset_frame, report, work):
+def _without_excess(y, end, excess, h, offset_frame, report, scratch):
     """State `end` without the created energy `excess` [J], if that exceeds the errors of the stage and its solve.
 
     Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
     """
+    body = scratch.body
     x, q, v, L = end
-    size = kinetic_energy(y[1], y[2], y[3], work, offset_frame)
-    size += work.mass * h * h * qt.dot(work.free_acceleration, work.free_acceleration)
-    if not excess > max(work.tolerance, ENERGY_GAIN_TOLERANCE) * size:
+    size = kinetic_energy(y[1], y[2], y[3], body, offset_frame)
+    size += body.mass * h * h * qt.dot(body.free_acceleration, body.free_acceleration)
+    if not excess > max(scratch.settings.tolerance, ENERGY_GAIN_TOLERANCE) * size:
         return end
-    motion = kinetic_energy(q, v, L, work, offset_frame)
+    motion = kinetic_energy(q, v, L, body, offset_frame)
     if not excess < motion:
-        report[work.world, at.UNRESOLVED_MOTION] += 1.0
+        report[body.world, at.UNRESOLVED_MOTION] += 1.0
         return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     s = math.sqrt(1.0 - excess / motion)
     return x, q, (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
 
 
 @if_law((LAW_STIFFNESS,), _as_it_ends)
-def correct_spring_depth(n, y, end, h, offset_frame, report, work):
+def correct_spring_depth(n, y, end, h, offset_frame, report, scratch):
     """End of a stage from y with no point deeper than its spring's due depth, and no other point in a wall.
 
     The springs store at most the sum of the energy before, of the loss of motion and of the work of the loads. (Damping
@@ -196,52 +204,53 @@ def correct_spring_depth(n, y, end, h, offset_frame, report, work):
     later.) Friction far beyond 1 may push a turning point by more than its spring takes; this energy is taken from the
     motion.
     """
+    body = scratch.body
     x, q, v, L = end
-    R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * work.slop
-    x = _lifted(n, x, R, 1.0, offset_frame, work)
+    R, least = qt.to_matrix(q), NEGLIGIBLE_SLOP_SHARE * body.slop
+    x = _lifted(n, x, R, 1.0, offset_frame, scratch)
     before = 0.0
     for i in range(n):
-        before += 0.5 * contact_stiffness(work) * min(work.gap[i], 0.0) ** 2
-    stored = _stored(n, x, R, offset_frame, work)
+        before += 0.5 * contact_stiffness(body) * min(scratch.contacts.gap[i], 0.0) ** 2
+    stored = _stored(n, x, R, offset_frame, scratch)
     if stored > before:
-        budget = before + _work_of_loads(y, (x, q, v, L), h, offset_frame, work)
+        budget = before + _work_of_loads(y, (x, q, v, L), h, offset_frame, body)
         if stored > budget:
-            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), offset_frame, work)
-            stored = _stored(n, x, R, offset_frame, work)
-    gap, slot = nearest_outside_set(x, R, offset_frame, work)
+            x = _lifted(n, x, R, math.sqrt(max(budget, 0.0) / stored), offset_frame, scratch)
+            stored = _stored(n, x, R, offset_frame, scratch)
+    gap, slot = nearest_outside_set(x, R, offset_frame, scratch)
     if gap < -least:
-        x = _along(x, -gap, wall_normal(work.walls, wall_of(slot, work)))
-    end = lift_conserving_energy(x, end, offset_frame, work)
-    excess = stored - before - _work_of_loads(y, end, h, offset_frame, work)
-    return _without_excess(y, end, excess, h, offset_frame, report, work)
+        x = _along(x, -gap, wall_normal(scratch.scene.walls, wall_of(slot, scratch.scene)))
+    end = lift_conserving_energy(x, end, offset_frame, body)
+    excess = stored - before - _work_of_loads(y, end, h, offset_frame, body)
+    return _without_excess(y, end, excess, h, offset_frame, report, scratch)
 
 
-def _as_it_is(block, work):
+def _as_it_is(block, body):
     return block
 
 
 @if_law((LAW_STIFFNESS,), _as_it_is)
-def add_block_compliance(W, work):
+def add_block_compliance(W, body):
     """Block of a contact with itself, and γ."""
-    return W[0] + work.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
+    return W[0] + body.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
 
 
-def _as_assembled(n, width, work):
+def _as_assembled(n, width, scratch):
     return None
 
 
 @if_law((LAW_STIFFNESS,), _as_assembled)
-def add_delassus_compliance(n, width, work):
+def add_delassus_compliance(n, width, scratch):
     """Add γ to the assembled W."""
     for i in range(n):
-        work.delassus[width * i, width * i] += work.give
+        scratch.contacts.delassus[width * i, width * i] += scratch.body.give
 
 
-def _unyielding(value, rho, work):
+def _unyielding(value, rho, body):
     return value
 
 
 @if_law((LAW_STIFFNESS,), _unyielding)
-def scale_by_compliance(value, rho, work):
+def scale_by_compliance(value, rho, body):
     """Scale a normal impulse q - ρ u, or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
-    return value / (1.0 + rho * work.give)
+    return value / (1.0 + rho * body.give)

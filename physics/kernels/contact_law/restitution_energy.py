@@ -31,13 +31,13 @@ _FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
-def lift_conserving_energy(z, y, offset_frame, work):
+def lift_conserving_energy(z, y, offset_frame, body):
     """State y moved to the place z out of a wall. The work of the lift against the loads is taken from the motion."""
     x, q, v, L = y
-    d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), work.free_acceleration
-    lift = -work.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
-    if qt.dot(d, d) > (_FREE_LIFT_SLOPS * work.slop) ** 2 and lift > 0.0:
-        kinetic = kinetic_energy(q, v, L, work, offset_frame)
+    d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), body.free_acceleration
+    lift = -body.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
+    if qt.dot(d, d) > (_FREE_LIFT_SLOPS * body.slop) ** 2 and lift > 0.0:
+        kinetic = kinetic_energy(q, v, L, body, offset_frame)
         s = math.sqrt(1.0 - lift / kinetic) if lift < kinetic else 0.0
         v, L = (s * v[0], s * v[1], s * v[2]), (s * L[0], s * L[1], s * L[2])
     return z, q, v, L
@@ -60,32 +60,33 @@ def rebound_share(before, plastic, full, middle):
 
 
 @inlined
-def limit_rebound_energy(q, before, plastic, full, work, offset_frame):
+def limit_rebound_energy(q, before, plastic, full, body, offset_frame):
     """Motion (v, L) with the largest share s of the full rebound that creates no energy, and s.
 
     `before` is the energy before the impact [J], which the full rebound would raise.
     """
     (v0, L0), (v1, L1) = plastic, full
-    middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), work, offset_frame)
-    ends = kinetic_energy(q, v0, L0, work, offset_frame), kinetic_energy(q, v1, L1, work, offset_frame)
+    middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), body, offset_frame)
+    ends = kinetic_energy(q, v0, L0, body, offset_frame), kinetic_energy(q, v1, L1, body, offset_frame)
     s = rebound_share(before, ends[0], ends[1], middle)
     return lerp(v0, v1, s), lerp(L0, L1, s), s
 
 
 @kernel
-def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, work):
+def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, scratch):
     """Result of `solve_contacts` for `free` (v, L), with impulses shortened until they create no energy.
 
     For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
     ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before
     the stage. That is none at s = -A/B if A < 0, and less for any shorter.
     """
+    body = scratch.body
     v, L = free
     v_new, L_new, residual, sweeps, method = solved
     u, M = (v_new[0] - v[0], v_new[1] - v[1], v_new[2] - v[2]), (L_new[0] - L[0], L_new[1] - L[1], L_new[2] - L[2])
-    w0, dw = apply_inv_inertia(R, L, work.J), apply_inv_inertia(R, M, work.J)
-    A = work.mass * (qt.dot(u, before) + qt.dot(u, v)) + qt.dot(M, w) + qt.dot(M, w0)
-    B = work.mass * qt.dot(u, u) + qt.dot(M, dw)
+    w0, dw = apply_inv_inertia(R, L, body.J), apply_inv_inertia(R, M, body.J)
+    A = body.mass * (qt.dot(u, before) + qt.dot(u, v)) + qt.dot(M, w) + qt.dot(M, w0)
+    B = body.mass * qt.dot(u, u) + qt.dot(M, dw)
     if not A + B > 0.0:
         return solved
     s = 0.0
@@ -95,5 +96,5 @@ def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, work):
     if friction is None:
         width = 1
     for r in range(width * n):
-        work.impulse[r] *= s
+        scratch.contacts.impulse[r] *= s
     return lerp(v, v_new, s), lerp(L, L_new, s), residual, sweeps, method

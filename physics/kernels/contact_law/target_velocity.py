@@ -45,13 +45,13 @@ class TargetLimits(NamedTuple):
 
 
 @inlined
-def may_have_impact(bounce_speed, slop_speed, work):
+def may_have_impact(bounce_speed, slop_speed, scratch):
     """True if a contact of the set is fast enough for an impact; else no impact is looked for."""
-    return work.approach > (min(bounce_speed, slop_speed) if work.restitution > 0.0 else slop_speed)
+    return scratch.contacts.approach > (min(bounce_speed, slop_speed) if scratch.body.restitution > 0.0 else slop_speed)
 
 
 @inlined
-def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, work):
+def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, scratch):
     """Set the targets of an impact; return its kind: nothing, contacts to bring to rest, or an impact.
 
     A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
@@ -63,33 +63,35 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, 
     A contact that continues from the last stage has hit nothing (`persistent_contacts`). It is brought to rest, and its
     speed set to zero, without an impact.
     """
+    contacts = scratch.contacts
     found, rate = NO_IMPACT, 1.0 / h
     for i in range(n):
-        s = -work.speed[i]
+        s = -contacts.speed[i]
         goal = 0.0
-        is_bounce = work.restitution > 0.0 and s > bounce_speed
+        is_bounce = scratch.body.restitution > 0.0 and s > bounce_speed
         if is_bounce or s < 0.0:
-            goal = work.restitution * s
-        if is_bounce or s > slop_speed + max(work.gap[i], 0.0) * rate:
-            if is_persistent_contact(i, y, h, offset_frame, memory, work):
-                work.speed[i] = goal = 0.0
+            goal = scratch.body.restitution * s
+        if is_bounce or s > slop_speed + max(contacts.gap[i], 0.0) * rate:
+            if is_persistent_contact(i, y, h, offset_frame, memory, scratch):
+                contacts.speed[i] = goal = 0.0
                 found = max(found, RESIDUAL_APPROACH)
             else:
                 found = TRUE_IMPACT
-        work.target[i, 0] = goal
-        work.target[i, 1] = 0.0
-        work.target[i, 2] = 0.0
+        contacts.target[i, 0] = goal
+        contacts.target[i, 1] = 0.0
+        contacts.target[i, 2] = 0.0
     return found
 
 
 @inlined
-def is_above_wall(i, n, work):
+def is_above_wall(i, n, scratch):
     """True if a contact of the wall of contact i is still above it."""
-    if not work.widest > work.slop:
+    contacts = scratch.contacts
+    if not contacts.widest > scratch.body.slop:
         return False
-    wall = wall_of(work.slot[i], work)
+    wall = wall_of(contacts.slot[i], scratch.scene)
     for j in range(n):
-        if work.gap[j] > work.slop and wall_of(work.slot[j], work) == wall:
+        if contacts.gap[j] > scratch.body.slop and wall_of(contacts.slot[j], scratch.scene) == wall:
             return True
     return False
 
@@ -120,16 +122,17 @@ def _in_frame(k, a, walls):
 
 
 @kernel
-def _wandering(k, R, w, offset_frame, work):
+def _wandering(k, R, w, offset_frame, scratch):
     """`contact_arm_and_rate` of a body without vertices at wall k, apart from the code of blocks."""
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    return contact_arm_and_rate(work.shape, dims, R, w, wall_normal(work.walls, k), 0, offset_frame, work)
+    body = scratch.body
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    return contact_arm_and_rate(body.shape, dims, R, w, wall_normal(scratch.scene.walls, k), 0, offset_frame, body)
 
 
 @inlined
-def _wandering_point(k, R, w, alpha, offset_frame, work):
+def _wandering_point(k, R, w, alpha, offset_frame, scratch):
     """Return ω x r, ω x ṙ and α x r of a body without vertices at wall k, four times each."""
-    r, rate = _wandering(k, R, w, offset_frame, work)
+    r, rate = _wandering(k, R, w, offset_frame, scratch)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
         (broadcast(turn[0]), broadcast(turn[1]), broadcast(turn[2])),
@@ -139,13 +142,14 @@ def _wandering_point(k, R, w, alpha, offset_frame, work):
 
 
 @inlined
-def _aim_at_wall(first, n, motion, limits, offset_frame, work):
+def _aim_at_wall(first, n, motion, limits, offset_frame, scratch):
     """Do `set_resting_targets` for contacts from `first` on, up to four of one wall; return the next contact."""
-    walls, arm = work.walls, work.arm
+    scene, contacts = scratch.scene, scratch.contacts
+    walls, arm = scene.walls, contacts.arm
     R, v, w, alpha = motion
     half, is_turning, negligible, rate = limits
-    k, last = wall_of(work.slot[first], work), first
-    while last + 1 < min(n, first + LANE_COUNT) and wall_of(work.slot[last + 1], work) == k:
+    k, last = wall_of(contacts.slot[first], scene), first
+    while last + 1 < min(n, first + LANE_COUNT) and wall_of(contacts.slot[last + 1], scene) == k:
         last += 1
     t0 = t1 = t2 = broadcast(0.0)
     if is_turning:
@@ -156,28 +160,28 @@ def _aim_at_wall(first, n, motion, limits, offset_frame, work):
         )
         turn = qt.cross(w, r)
         a, b = qt.cross(w, turn), qt.cross(alpha, r)
-        if work.shape != BLOCK:
-            turn, a, b = _wandering_point(k, R, w, alpha, offset_frame, work)
+        if scratch.body.shape != BLOCK:
+            turn, a, b = _wandering_point(k, R, w, alpha, offset_frame, scratch)
         u = (v[0] + turn[0], v[1] + turn[1], v[2] + turn[2])
         c = (-half * (a[0] + b[0]), -half * (a[1] + b[1]), -half * (a[2] + b[2]))
         t0, t1, t2 = clamp_target_to_energy(_in_frame(k, c, walls), _in_frame(k, u, walls))
-    if is_above_wall(first, n, work):
-        t0 = t0 - rate * gather_numbers_from(work.gap, first, last)
+    if is_above_wall(first, n, scratch):
+        t0 = t0 - rate * gather_numbers_from(contacts.gap, first, last)
     is_little = larger(abs(t0), larger(abs(t1), abs(t2))) <= negligible
     t0, t1, t2 = select_lanes(is_little, 0.0, t0), select_lanes(is_little, 0.0, t1), select_lanes(is_little, 0.0, t2)
-    scatter_columns(work.target, first, last, t0, t1, t2)
+    scatter_columns(contacts.target, first, last, t0, t1, t2)
     return last + 1
 
 
 @kernel
-def _aim_at_others(first, n, motion, limits, offset_frame, work):
+def _aim_at_others(first, n, motion, limits, offset_frame, scratch):
     """Do `set_resting_targets` for contacts from `first` on; seldom called, since most bodies touch one wall."""
     while first < n:
-        first = _aim_at_wall(first, n, motion, limits, offset_frame, work)
+        first = _aim_at_wall(first, n, motion, limits, offset_frame, scratch)
 
 
 @inlined
-def set_resting_targets(n, motion, h, offset_frame, work):
+def set_resting_targets(n, motion, h, offset_frame, scratch):
     """Set the targets of a resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
 
     The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
@@ -187,11 +191,12 @@ def set_resting_targets(n, motion, h, offset_frame, work):
     the solve, or one that would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body
     comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
     """
+    body = scratch.body
     w = motion.w
-    is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and work.shape != SPHERE
-    negligible = max(work.tolerance * work.acceleration * h, NEGLIGIBLE_SLOP_SHARE * work.slop / h)
-    rate = (1.0 if work.is_last else GAP_CLOSING_SHARE) / h
+    is_turning = 0.0 < qt.dot(w, w) * h * h <= MAX_TARGET_TURN * MAX_TARGET_TURN and body.shape != SPHERE
+    negligible = max(scratch.settings.tolerance * body.acceleration * h, NEGLIGIBLE_SLOP_SHARE * body.slop / h)
+    rate = (1.0 if scratch.stage.is_last else GAP_CLOSING_SHARE) / h
     limits = TargetLimits(0.5 * h, is_turning, negligible, rate)
-    first = _aim_at_wall(0, n, motion, limits, offset_frame, work)
+    first = _aim_at_wall(0, n, motion, limits, offset_frame, scratch)
     if first < n:
-        _aim_at_others(first, n, motion, limits, offset_frame, work)
+        _aim_at_others(first, n, motion, limits, offset_frame, scratch)

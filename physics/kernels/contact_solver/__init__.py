@@ -19,29 +19,30 @@ R : tuple of 9 floats
     Principal frame to world.
 v, L : tuples of 3 floats
     Velocity [m/s] and angular momentum [kg m²/s] without contact impulses, world frame.
-work : record
-    Work space of the body (`time_stepping.workspace`). Solvers read its members
+scratch : record
+    Workspace of the body (`time_stepping.workspace`). Solvers read of its groups
 
-    - `slot`, `arm`, `target` of each contact, `walls`, `mass`, `J`, `radius`, `mu` and the members of its laws;
-    - `impulse`, the warm start: 3 n numbers with friction, n without; zeros where nothing is known;
-    - `mode`, the direct solve to try first, which did it last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`,
+    - `contacts`: `slot`, `arm`, `target` of each contact;
+    - `contacts.impulse`, the warm start: 3 n numbers with friction, n without; zeros where nothing is known;
+    - `scene.walls`; of `body` its `mass`, `J`, `radius`, `mu` and the members of its laws;
+    - `stage.mode`, the direct solve to try first, which did it last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`,
       `TRY_MIXED`);
-    - `tolerance` of the relative residual; `residual_limit`, a tolerance of iterative solves [m/s];
-      `target_error_limit`, the misfit of targets that contacts that hold may have [m/s];
-    - `sweeps`, how many sweeps are made at most.
+    - `settings.tolerance` of the relative residual; `stage.residual_limit`, a tolerance of iterative solves [m/s];
+      `stage.target_error_limit`, the misfit of targets that contacts that hold may have [m/s];
+    - `settings.sweeps`, how many sweeps are made at most.
 
 Left behind
 -----------
-work.impulse
+scratch.contacts.impulse
     The solution, along the unit tangents of each wall.
-work.mode
+scratch.stage.mode
     The direct solve that did it. `single_wall` leaves it as it was for one contact, and for two that are left of a
     face; so do iterative solves and pivoting.
 v, L, residual, sweeps, method
     Returned by `solve.solve_contacts`: motion with the impulses, relative residual, sweeps and Newton steps made, and
     `METHOD_DIRECT`, `METHOD_SWEEPS` or `METHOD_PIVOTING` (`state.layout`), the last method tried.
 
-All other members of `work` that a solver writes are scratch.
+The group `solver`, and all else that a solver writes, is memory of its own.
 
 Residual
 --------
@@ -65,11 +66,11 @@ Failure
 -------
 No solver raises. Each says so in its own way, and `solve_contacts` goes on to the next one:
 
-- A direct solver returns `found` False, and has changed neither `work.impulse` nor `work.mode`.
+- A direct solver returns `found` False, and has changed neither `contacts.impulse` nor `stage.mode`.
 - Sweeps and Newton's method return a residual above their tolerance, and leave the impulses they came to. Newton's
   method leaves the best it met, so its residual is at most that of its start.
 - The LCP solvers return a status other than `LCP_SOLVED`, and leave the impulses as they were.
-- `solve_contacts` returns a residual above `work.tolerance`. Callers count that as unconverged
+- `solve_contacts` returns a residual above `settings.tolerance`. Callers count that as unconverged
   (`state.body.report_solve`).
 
 Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure. Velocities
@@ -79,11 +80,11 @@ Solvers
 -------
 In the order in which `solve_contacts` tries them; the first result within its tolerance is taken.
 
-1. Direct, without W, to the tolerance `work.tolerance` max |b|. They return (found, v, L, relative residual).
+1. Direct, without W, to the tolerance `settings.tolerance` max |b|. They return (found, v, L, relative residual).
 
    a. `sticking.solve_all_sticking`: all contacts take their targets, or open. Any number of contacts and walls, with
       friction, walls that do not give. It comes before b where it is likelier: for three or four contacts of one wall
-      if friction may stop them (`patch_start.may_stick`), for two, or several walls, if `work.mode` is
+      if friction may stop them (`patch_start.may_stick`), for two, or several walls, if `stage.mode` is
       `TRY_STICKING`. Otherwise it comes after b, for a single contact always.
    b. `single_wall.solve_single_wall`: contacts hold, slide or open. One to four contacts of one wall; at most two where
       walls give. It tries `two_contacts.solve_one_contact` for one, `two_contacts.solve_two_contacts` for two, and
@@ -91,17 +92,16 @@ In the order in which `solve_contacts` tries them; the first result within its t
       nothing was found. That one in turn calls
 
       - `primal_dual_friction.solve_stick_slip_patch`, where a direction of sliding would turn right round, and first
-        if `work.mode` is `TRY_MIXED` and the warm start is of the present loads;
+        if `stage.mode` is `TRY_MIXED` and the warm start is of the present loads;
       - `two_contacts.solve_two_contacts`, once two contacts are left.
 
-2. Iterative, on the assembled `work.delassus` and `work.bias`, from `work.impulse` on. The tolerance is the smaller of
-   `work.tolerance` max |b| and `work.residual_limit`, but not below rounding. They return (sweeps or steps,
-   residual [m/s]), and
-   leave u in `work.velocity`.
+2. Iterative, on the assembled `contacts.delassus` and `contacts.bias`, from `contacts.impulse` on. The tolerance is the
+   smaller of `settings.tolerance` max |b| and `stage.residual_limit`, but not below rounding. They return (sweeps or
+   steps, residual [m/s]), and leave u in `contacts.velocity`.
 
    a. Without friction `gauss_seidel.normal_sweeps`; where walls give, after a few pivots of Dantzig's method.
    b. With friction `gauss_seidel.cone_sweeps`, a dozen, in turn with `proximal_newton.proximal_newton`; where walls
-      give, Newton's method comes first. This goes on until `work.sweeps` sweeps are made.
+      give, Newton's method comes first. This goes on until `settings.sweeps` sweeps are made.
 
 3. Pivoting, if the plan has it and the residual is above both the tolerance and 1 % of max |b|. With friction that is
    `friction_pyramid.solve_pyramid_lcp` (Lemke's method), without it `friction_pyramid.solve_normal_lcp` (Dantzig's).

@@ -122,15 +122,16 @@ def swap_pair_trial(trial):
 
 
 @inlined
-def contact_in_wall_frame(i, body, work):
+def contact_in_wall_frame(i, body, scratch):
     """The `WallContact` of contact i of a `FreeBody`, with its impulse so far. Without friction there is none."""
+    contacts = scratch.contacts
     axes, u, w = body.axes, body.u, body.w
-    arm, ratio = (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2]), friction_ratio(work)
+    arm, ratio = (contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2]), friction_ratio(scratch.body)
     place = (ratio * qt.dot(axes[0], arm), ratio * qt.dot(axes[1], arm), qt.dot(axes[2], arm))
     f, impulse = point_velocity(place, u, w), (0.0, 0.0, 0.0)
-    if work.mu > 0.0:
-        impulse = (work.impulse[3 * i], work.impulse[3 * i + 1], work.impulse[3 * i + 2] / ratio)
-    approach = f[0] - work.target[i, 0], f[1] - work.target[i, 1], f[2] - ratio * work.target[i, 2]
+    if scratch.body.mu > 0.0:
+        impulse = (contacts.impulse[3 * i], contacts.impulse[3 * i + 1], contacts.impulse[3 * i + 2] / ratio)
+    approach = f[0] - contacts.target[i, 0], f[1] - contacts.target[i, 1], f[2] - ratio * contacts.target[i, 2]
     return WallContact(place, approach, impulse)
 
 

@@ -81,9 +81,9 @@ class PyramidProblem(NamedTuple):
 
 
 def pyramid_sizes(n_max: int) -> tuple[int, int]:
-    """Lengths of `work` (float64) and `index` (int64) for up to n_max contacts: 200 n_max² numbers.
+    """Lengths of `floats` (float64) and `index` (int64) for up to n_max contacts: 200 n_max² numbers.
 
-    About 1 MB for 24 contacts: one work space per thread, not one per world.
+    About 1 MB for 24 contacts: one workspace per thread, not one per world.
     """
     size = UNKNOWNS_PER_CONTACT * n_max
     (rows, columns), integers = lemke_sizes(size)
@@ -91,7 +91,7 @@ def pyramid_sizes(n_max: int) -> tuple[int, int]:
 
 
 def normal_lcp_sizes(n_max: int) -> tuple[int, int]:
-    """Lengths of `work` (float64) and `index` (int64) of `solve_normal_lcp` for up to n_max contacts."""
+    """Lengths of `floats` (float64) and `index` (int64) of `solve_normal_lcp` for up to n_max contacts."""
     (rows, columns), integers = dantzig_sizes(n_max)
     return rows * columns + n_max, integers
 
@@ -191,24 +191,24 @@ def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
 
 
 @inlined
-def _pyramid_problem(n, work):
-    """Make the `PyramidProblem` in `work`, whose contents are not set."""
+def _pyramid_problem(n, floats):
+    """Make the `PyramidProblem` in `floats`, whose contents are not set."""
     size = UNKNOWNS_PER_CONTACT * n
     rows, columns = size + 3, size + 2
     end_M = size * size
     end_tableau = end_M + rows * columns
     end_z = end_tableau + 2 * size
     return PyramidProblem(
-        work[:end_M].reshape((size, size)),
-        work[end_tableau : end_tableau + size],
-        work[end_tableau + size : end_z],
-        work[end_M:end_tableau].reshape((rows, columns)),
-        work[end_z : end_z + 2 * n].reshape((n, 2)),
+        floats[:end_M].reshape((size, size)),
+        floats[end_tableau : end_tableau + size],
+        floats[end_tableau + size : end_z],
+        floats[end_M:end_tableau].reshape((rows, columns)),
+        floats[end_z : end_z + 2 * n].reshape((n, 2)),
     )
 
 
 @kernel
-def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
+def solve_pyramid_lcp(W, b, mu, n, p, floats, index, max_pivots):
     """Solve the contact problem with a friction pyramid of eight directions by Lemke's method.
 
     Parameters
@@ -224,7 +224,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     p : (3 n or more,) float64, in and out
         [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
         the solution if the status is `LCP_SOLVED`, else unchanged.
-    work, index : float64, int64, work
+    floats, index : float64, int64, scratch
         Of the lengths that `pyramid_sizes` gives, or longer.
     max_pivots : int
         About 10 n are usual.
@@ -242,7 +242,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
     10⁵ problems, rounding loses one: a path without a result is followed once more with every
     pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
     """
-    M, q, z, tableau, heading = _pyramid_problem(n, work)
+    M, q, z, tableau, heading = _pyramid_problem(n, floats)
     largest = 0.0
     for i in range(3 * n):
         if not mu[i // 3] >= 0.0 or not math.isfinite(p[i]):
@@ -265,7 +265,7 @@ def solve_pyramid_lcp(W, b, mu, n, p, work, index, max_pivots):
 
 
 @kernel
-def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
+def solve_normal_lcp(W, b, n, p, floats, index, max_pivots):
     """Solve the contact problem without friction: p >= 0, u = W p + b >= 0, p·u = 0.
 
     Parameters
@@ -278,7 +278,7 @@ def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
         Number of contacts.
     p : (n or more,) float64, out
         [N s]. The solution if the status is `LCP_SOLVED`, else unchanged.
-    work, index : float64, int64, work
+    floats, index : float64, int64, scratch
         Of the lengths that `normal_lcp_sizes` gives, or longer.
     max_pivots : int
         About 2 n are usual.
@@ -289,8 +289,8 @@ def solve_normal_lcp(W, b, n, p, work, index, max_pivots):
         As `physics.kernels.lcp.dantzig.dantzig`.
     """
     size = (2 * n + 6) * n
-    z = work[size : size + n]
-    status, pivots = dantzig(W, b[:n], z, work[:size].reshape((2 * n + 6, n)), index, max_pivots)
+    z = floats[size : size + n]
+    status, pivots = dantzig(W, b[:n], z, floats[:size].reshape((2 * n + 6, n)), index, max_pivots)
     if status == LCP_SOLVED:
         for i in range(n):
             p[i] = z[i]

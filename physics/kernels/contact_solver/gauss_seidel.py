@@ -27,7 +27,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.half_space.contact_point import wall_of
 
-# Columns of `work.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.
+# Columns of `solver.local`: rows of the inverse of the contact's 3x3 block, then ρ_t and ρ.
 LOCAL_TANGENT_RHO = 9
 LOCAL_NORMAL_RHO = 10
 
@@ -43,8 +43,8 @@ _MAX_CONTRACTION_RATIO = 0.998
 
 
 @kernel
-def assemble_delassus(n, width, R, v, w, work):
-    """Jacobian rows, W = J M⁻¹ Jᵀ and b = J (v, ω) - target for the n contacts in `work`.
+def assemble_delassus(n, width, R, v, w, scratch):
+    """Jacobian rows, W = J M⁻¹ Jᵀ and b = J (v, ω) - target for the n contacts in `scratch`.
 
     Parameters
     ----------
@@ -55,8 +55,9 @@ def assemble_delassus(n, width, R, v, w, work):
     v, w : tuples of 3 floats
         Velocity and angular velocity without contact impulses, world frame [m/s, rad/s].
     """
-    walls, inv_mass, J = work.walls, 1.0 / work.mass, work.J
-    frame, angular, response, arm = work.frame, work.angular, work.response, work.arm
+    contacts = scratch.contacts
+    walls, inv_mass, J = scratch.scene.walls, 1.0 / scratch.body.mass, scratch.body.J
+    frame, angular, response, arm = contacts.frame, contacts.angular, contacts.response, contacts.arm
     # I⁻¹ in the world frame, six numbers.
     j1, j2, j3 = J[0], J[1], J[2]
     k11 = j1 * R[0] * R[0] + j2 * R[1] * R[1] + j3 * R[2] * R[2]
@@ -66,7 +67,7 @@ def assemble_delassus(n, width, R, v, w, work):
     k23 = j1 * R[3] * R[6] + j2 * R[4] * R[7] + j3 * R[5] * R[8]
     k33 = j1 * R[6] * R[6] + j2 * R[7] * R[7] + j3 * R[8] * R[8]
     for i in range(n):
-        wall = wall_of(work.slot[i], work)
+        wall = wall_of(contacts.slot[i], scratch.scene)
         x, y, z = arm[i, 0], arm[i, 1], arm[i, 2]
         for c in range(width):
             row = width * i + c
@@ -77,8 +78,10 @@ def assemble_delassus(n, width, R, v, w, work):
             response[row, 0] = k11 * gx + k12 * gy + k13 * gz
             response[row, 1] = k12 * gx + k22 * gy + k23 * gz
             response[row, 2] = k13 * gx + k23 * gy + k33 * gz
-            work.bias[row] = (a * v[0] + b * v[1] + d * v[2]) + (gx * w[0] + gy * w[1] + gz * w[2]) - work.target[i, c]
-    W = work.delassus
+            contacts.bias[row] = (
+                (a * v[0] + b * v[1] + d * v[2]) + (gx * w[0] + gy * w[1] + gz * w[2]) - contacts.target[i, c]
+            )
+    W = contacts.delassus
     for r in range(width * n):
         gx, gy, gz = angular[r, 0], angular[r, 1], angular[r, 2]
         a, b, d = frame[r, 0] * inv_mass, frame[r, 1] * inv_mass, frame[r, 2] * inv_mass
@@ -91,9 +94,9 @@ def assemble_delassus(n, width, R, v, w, work):
 
 
 @kernel
-def invert_contact_blocks(n, work):
+def invert_contact_blocks(n, scratch):
     """Inverse of each contact's 3x3 block, and the steps ρ, ρ_t of the residual."""
-    W, local = work.delassus, work.local
+    W, local = scratch.contacts.delassus, scratch.solver.local
     for i in range(n):
         r = 3 * i
         a, b, c = W[r, r], W[r, r + 1], W[r, r + 2]
@@ -148,10 +151,10 @@ def normal_residual(n, p, u, W):
 
 
 @kernel
-def normal_sweeps(n, tolerance, limit, work):
+def normal_sweeps(n, tolerance, limit, contacts):
     """`cone_sweeps` for frictionless contacts: projected Gauss-Seidel on u = W p + b, 0 <= p ⟂ u >= 0."""
-    p, u, W = work.impulse, work.velocity, work.delassus
-    update_contact_velocities(n, W, p, work.bias, u)
+    p, u, W = contacts.impulse, contacts.velocity, contacts.delassus
+    update_contact_velocities(n, W, p, contacts.bias, u)
     residual = normal_residual(n, p, u, W)
     sweeps = 0
     while not residual <= tolerance and sweeps < limit:
@@ -241,9 +244,10 @@ def _local_impulse(i, impulse, u, mu, W, local):
 
 
 @inlined
-def _extrapolate(n, mu, ratio, work):
+def _extrapolate(n, mu, ratio, scratch):
     """Add the rest of the geometric series of its changes to p, project it into the cones, and update u = W p + b."""
-    p, change = work.impulse, work.change
+    contacts = scratch.contacts
+    p, change = contacts.impulse, scratch.solver.change
     s = ratio / (1.0 - ratio)
     for i in range(n):
         r = 3 * i
@@ -254,14 +258,14 @@ def _extrapolate(n, mu, ratio, work):
             q1 *= limit / size
             q2 *= limit / size
         p[r], p[r + 1], p[r + 2] = q0, q1, q2
-    update_contact_velocities(3 * n, work.delassus, p, work.bias, work.velocity)
+    update_contact_velocities(3 * n, contacts.delassus, p, contacts.bias, contacts.velocity)
 
 
 @kernel
-def cone_sweeps(n, mu, tolerance, limit, work):
+def cone_sweeps(n, mu, tolerance, limit, scratch):
     """Sweep until the residual is at most `tolerance` [m/s] or `limit` sweeps are done.
 
-    `work.impulse` holds the warm start and receives the result, `work.velocity` the contact velocities.
+    `contacts.impulse` holds the warm start and receives the result, `contacts.velocity` the contact velocities.
 
     Returns
     -------
@@ -269,9 +273,11 @@ def cone_sweeps(n, mu, tolerance, limit, work):
     residual : float
         [m/s], measured on the returned impulses.
     """
-    p, u, W, local, change = work.impulse, work.velocity, work.delassus, work.local, work.change
+    contacts = scratch.contacts
+    p, u, W = contacts.impulse, contacts.velocity, contacts.delassus
+    local, change = scratch.solver.local, scratch.solver.change
     rows = 3 * n
-    update_contact_velocities(rows, W, p, work.bias, u)
+    update_contact_velocities(rows, W, p, contacts.bias, u)
     residual = cone_residual(n, p, u, mu, local)
     sweeps = 0
     while not residual <= tolerance and sweeps < limit:
@@ -288,6 +294,6 @@ def cone_sweeps(n, mu, tolerance, limit, work):
                 u[s] += (W[r, s] * d0 + W[r + 1, s] * d1) + W[r + 2, s] * d2
         sweeps += 1
         if sweeps % EXTRAPOLATION_PERIOD == 0 and product > 0.0:
-            _extrapolate(n, mu, min(product / square, _MAX_CONTRACTION_RATIO), work)
+            _extrapolate(n, mu, min(product / square, _MAX_CONTRACTION_RATIO), scratch)
         residual = cone_residual(n, p, u, mu, local)
     return sweeps, residual

@@ -34,59 +34,60 @@ def solve_symmetric(k, b):
 
 
 @inlined
-def first_active(n, work):
+def first_active(n, solver):
     """Index of the first active contact."""
     for i in range(n):
-        if work.active[i] != 0:
+        if solver.active[i] != 0:
             return i
     return 0
 
 
 @inlined
-def is_in_cone(pn, pa, pb, work):
+def is_in_cone(pn, pa, pb, body):
     """True if an impulse (normal, tangents) is in the cone of friction."""
-    limit, b = work.mu * pn, pb / friction_ratio(work)
+    limit, b = body.mu * pn, pb / friction_ratio(body)
     return pa * pa + b * b <= limit * limit
 
 
 @inlined
-def distribute_by_bolt_group(n, count, c, F, a, work):
+def distribute_by_bolt_group(n, count, c, F, a, scratch):
     """Bolt-group impulses: (contact that pulls most or -1, whether all are in their cones)."""
-    walls = work.walls
+    solver = scratch.solver
+    walls = scratch.scene.walls
     lowest = 0.0
     loser = -1
     holds = True
     s = 1.0 / count
     for i in range(n):
-        if work.active[i] == 0:
+        if solver.active[i] == 0:
             continue
-        wall = wall_of(work.slot[i], work)
-        m = qt.cross(a, minus(contact_arm(work, i), c))
+        wall = wall_of(scratch.contacts.slot[i], scratch.scene)
+        m = qt.cross(a, minus(contact_arm(scratch.contacts, i), c))
         p = (s * F[0] + m[0], s * F[1] + m[1], s * F[2] + m[2])
         pn = qt.dot(wall_axis(walls, wall, WALL_NORMAL), p)
         pa, pb = qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p), qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
-        work.normal[i] = pn
-        work.across[i, 0], work.across[i, 1] = pa, pb
+        solver.normal[i] = pn
+        solver.across[i, 0], solver.across[i, 1] = pa, pb
         if not pn >= lowest:
             lowest = pn
             loser = i
-        if not is_in_cone(pn, pa, pb, work):
+        if not is_in_cone(pn, pa, pb, scratch.body):
             holds = False
     return loser, holds
 
 
 @inlined
-def _coordinates_along(axis, n, work):
+def _coordinates_along(axis, n, contacts):
     """Coordinates of the contacts along an axis."""
     return (
-        axis[0] * gather_column(work.arm, 0, n)
-        + axis[1] * gather_column(work.arm, 1, n)
-        + axis[2] * gather_column(work.arm, 2, n)
+        axis[0] * gather_column(contacts.arm, 0, n)
+        + axis[1] * gather_column(contacts.arm, 1, n)
+        + axis[2] * gather_column(contacts.arm, 2, n)
     )
 
 
 @inlined
-def distribute_by_load(n, work):
+def distribute_by_load(n, scratch):
     """Distribute the tangential impulses of one wall like the normal ones; return whether all stay in their cones.
 
     With weights g_i, at first the normal impulses, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i u_i, where
@@ -97,22 +98,23 @@ def distribute_by_load(n, work):
     all would be equally near to their cones, μ p_n / |u| (Weiszfeld's). The u_i are those of a rigid motion, in which
     friction takes up Σ μ p_n,i |u_i| at most: where Σ p_t,i·u_i is more, no sharing holds.
     """
-    walls, active, ratio = work.walls, work.active, friction_ratio(work)
-    wall = wall_of(work.slot[first_active(n, work)], work)
+    scene, contacts, solver = scratch.scene, scratch.contacts, scratch.solver
+    walls, active, ratio = scene.walls, solver.active, friction_ratio(scratch.body)
+    wall = wall_of(contacts.slot[first_active(n, solver)], scene)
     for i in range(n):
-        if n > LANE_COUNT or (active[i] != 0 and wall_of(work.slot[i], work) != wall):
+        if n > LANE_COUNT or (active[i] != 0 and wall_of(contacts.slot[i], scene) != wall):
             return False
     on = gather_numbers(active, n) * valid_lanes_mask(n)
     a, b = (
-        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_1), n, work),
-        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_2), n, work),
+        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_1), n, contacts),
+        _coordinates_along(wall_axis(walls, wall, WALL_TANGENT_2), n, contacts),
     )
     p, x, y = (
-        on * gather_numbers(work.normal, n),
-        on * gather_column(work.across, 0, n),
-        on * gather_column(work.across, 1, n),
+        on * gather_numbers(solver.normal, n),
+        on * gather_column(solver.across, 0, n),
+        on * gather_column(solver.across, 1, n),
     )
-    fa, fb, spin, limit, g = lane_sum(x), lane_sum(y), lane_sum(a * y - b * x), work.mu * p, p
+    fa, fb, spin, limit, g = lane_sum(x), lane_sum(y), lane_sum(a * y - b * x), scratch.body.mu * p, p
     for _ in range(_MAX_WEISZFELD_STEPS):
         s = 1.0 / lane_sum(g)
         ca, cb = s * lane_sum(g * a), s * lane_sum(g * b)
@@ -125,7 +127,7 @@ def distribute_by_load(n, work):
         if first_true_lane(~(size <= limit)) < 0:
             for i in range(n):
                 if active[i] != 0:
-                    work.across[i, 0], work.across[i, 1] = (g * x)[i], (g * y)[i]
+                    solver.across[i, 0], solver.across[i, 1] = (g * x)[i], (g * y)[i]
             return True
         slip = ratio * y
         if lane_sum(g * (x * x + y * y)) > lane_sum(limit * lane_sqrt(x * x + slip * slip)):

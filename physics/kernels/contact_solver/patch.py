@@ -100,28 +100,29 @@ class PatchFriction(NamedTuple):
 
 
 @inlined
-def patch_coordinates_along(axis, n, work):
+def patch_coordinates_along(axis, n, contacts):
     """Coordinates of the contacts along an axis, from the centre of mass."""
     return (
-        axis[0] * gather_column(work.arm, 0, n)
-        + axis[1] * gather_column(work.arm, 1, n)
-        + axis[2] * gather_column(work.arm, 2, n)
+        axis[0] * gather_column(contacts.arm, 0, n)
+        + axis[1] * gather_column(contacts.arm, 1, n)
+        + axis[2] * gather_column(contacts.arm, 2, n)
     )
 
 
 @inlined
-def gather_patch(n, body, work):
-    """The `Patch` of the n contacts in `work`, on the wall of `body`."""
-    axes, inv_mass, K, ratio = body.axes, body.inv_mass, body.K, friction_ratio(work)
+def gather_patch(n, body, scratch):
+    """The `Patch` of the n contacts in `scratch`, on the wall of `body`."""
+    contacts = scratch.contacts
+    axes, inv_mass, K, ratio = body.axes, body.inv_mass, body.K, friction_ratio(scratch.body)
     c, a, b = (
-        ratio * patch_coordinates_along(axes[0], n, work),
-        ratio * patch_coordinates_along(axes[1], n, work),
-        patch_coordinates_along(axes[2], n, work),
+        ratio * patch_coordinates_along(axes[0], n, contacts),
+        ratio * patch_coordinates_along(axes[1], n, contacts),
+        patch_coordinates_along(axes[2], n, contacts),
     )
     target = (
-        gather_column(work.target, 0, n),
-        gather_column(work.target, 1, n),
-        ratio * gather_column(work.target, 2, n),
+        gather_column(contacts.target, 0, n),
+        gather_column(contacts.target, 1, n),
+        ratio * gather_column(contacts.target, 2, n),
     )
     mass_b = ratio * ratio * inv_mass
     mobility = (inv_mass + mass_b) + K[0] * (a * a + b * b) - 2.0 * c * (K[1] * a + K[2] * b) + c * c * (K[3] + K[5])

@@ -139,13 +139,13 @@ def solve_normal_slopes(patch, on, normal, friction, K):
 
 
 @inlined
-def planar_compliance(problem, normal, friction, turning, work):
+def planar_compliance(problem, normal, friction, turning, body):
     """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
 
     `friction` and `turning` are those of `solve_normal_slopes`. Only a step of Newton's method needs the compliance.
     """
     _, a, b = problem.patch.points
-    x, y, K, inv_mass, ratio = friction.x, friction.y, problem.body.K, problem.body.inv_mass, friction_ratio(work)
+    x, y, K, inv_mass, ratio = friction.x, friction.y, problem.body.K, problem.body.inv_mass, friction_ratio(body)
     mass_b = ratio * ratio * inv_mass
     cc, ca, cb = normal.center
     g1, g2, h1, h2, f1, f2 = turning
@@ -201,10 +201,10 @@ def patch_normal_impulses(patch, on, normal, y, friction):
 
 
 @inlined
-def planar_motion_after(exerted, body, work):
+def planar_motion_after(exerted, body, scratch):
     """Planar motion after impulses along the tangents, and moments."""
     fa, fb, tn, ta, tb = exerted
-    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
+    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(scratch.body)
     mass_b = ratio * ratio * inv_mass
     return u[1] + inv_mass * fa, u[2] + mass_b * fb, w[0] + (K[0] * tn + K[1] * ta + K[2] * tb)
 

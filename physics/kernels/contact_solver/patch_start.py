@@ -17,23 +17,26 @@ _MIN_SLIP_SHARE = 0.01
 
 
 @inlined
-def warm_start_motion(n, patch, on, body, work):
-    """Planar motion after the warm-start impulses in `work`, and whether these belong to the present loads."""
+def warm_start_motion(n, patch, on, body, scratch):
+    """Planar motion after the warm-start impulses in `scratch`, and whether these belong to the present loads."""
+    contacts = scratch.contacts
     c, a, b = patch.points
-    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(work)
-    p, x = on * gather_component(work.impulse, 0, n), on * gather_component(work.impulse, 1, n)
-    y = on * gather_component(work.impulse, 2, n) / ratio
+    u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(scratch.body)
+    p, x = on * gather_component(contacts.impulse, 0, n), on * gather_component(contacts.impulse, 1, n)
+    y = on * gather_component(contacts.impulse, 2, n) / ratio
     spin = K[0] * (a * y - b * x) + K[1] * (b * p - c * y) + K[2] * (c * x - a * p)
     motion = u[1] + inv_mass * lane_sum(x), u[2] + ratio * ratio * inv_mass * lane_sum(y), w[0] + lane_sum(spin)
     return motion, is_warm_start_valid(inv_mass * lane_sum(p), -u[0])
 
 
 @inlined
-def warm_start_friction(n, on, work):
-    """Impulses per normal impulse along the tangents (two lanes) of those in `work`; 0 where nothing pushes."""
-    p = on * gather_component(work.impulse, 0, n)
+def warm_start_friction(n, on, scratch):
+    """Impulses per normal impulse along the tangents (two lanes) of those in `scratch`; 0 where nothing pushes."""
+    contacts = scratch.contacts
+    p = on * gather_component(contacts.impulse, 0, n)
     s = select_lanes(p > 0.0, 1.0 / p, 0.0)
-    return s * gather_component(work.impulse, 1, n), s * gather_component(work.impulse, 2, n) / friction_ratio(work)
+    x, y = gather_component(contacts.impulse, 1, n), gather_component(contacts.impulse, 2, n)
+    return s * x, s * y / friction_ratio(scratch.body)
 
 
 @inlined
@@ -46,19 +49,23 @@ def _centroid_and_variance(n, a, b, on):
 
 
 @inlined
-def may_stick(n, axes, v, L, work):
+def may_stick(n, axes, v, L, scratch):
     """True if friction may stop a face with the velocity v and angular momentum L before friction.
 
     A sticking face stops at its wall. The pushes P remove the normal momentum, and friction, at most μP, the tangential
     one. Its moment about the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. So the result is True for every face
     that can stick. A face that slips within the tolerance of a solve would be taken for sticking, and creep.
     """
-    ratio, friction = friction_ratio(work), work.mu * qt.dot(axes[0], v)
+    body = scratch.body
+    ratio, friction = friction_ratio(body), body.mu * qt.dot(axes[0], v)
     va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
-    spin, slip = qt.dot(axes[0], L) / work.mass, va * va + vb * vb
+    spin, slip = qt.dot(axes[0], L) / body.mass, va * va + vb * vb
     if slip > limit or (slip == 0.0 and spin == 0.0):
         return slip <= limit
-    a, b = ratio * patch_coordinates_along(axes[1], n, work), patch_coordinates_along(axes[2], n, work)
+    a, b = (
+        ratio * patch_coordinates_along(axes[1], n, scratch.contacts),
+        patch_coordinates_along(axes[2], n, scratch.contacts),
+    )
     ca, cb, _ = _centroid_and_variance(n, a, b, valid_lanes_mask(n))
     moment = ca * vb - cb * va - spin
     a, b = a - ca, b - cb

@@ -234,7 +234,7 @@ def _primal_dual_step(problem, on, p, friction, u, compliance, delta, limits):
 
 
 @kernel
-def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, work):
+def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, scratch):
     """Impulses of a patch in which some contacts stick, and the other active ones slide.
 
     Parameters
@@ -257,7 +257,7 @@ def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, work):
         `ROUND_SOLVED`, `ROUND_PULLS` or `ROUND_FAILED`.
     """
     patch, mu, goal, may_open = problem.patch, problem.mu, problem.goal, not patient
-    limits = SlipLimits(_NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / work.tolerance)
+    limits = SlipLimits(_NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / scratch.settings.tolerance)
     for _ in range(_MAX_DUAL_ROUNDS):
         slip = patch_slip_velocities(patch, motion, normal)
         friction = PatchFriction(x, y, lane_sqrt(slip[0] * slip[0] + slip[1] * slip[1]))
@@ -265,12 +265,12 @@ def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, work):
         _, loser, p, exerted = patch_normal_impulses(patch, on, normal, slopes, friction)
         if loser >= 0 and may_open:
             return PatchRound(ROUND_PULLS, loser, p, x, y, exerted, 0.0, motion)
-        led_to = planar_motion_after(exerted, problem.body, work)
+        led_to = planar_motion_after(exerted, problem.body, scratch)
         miss = _friction_residual(patch.mobility, p, friction, mu, patch_slip_velocities(patch, led_to, normal))
         if loser < 0 and miss <= goal:
             return PatchRound(ROUND_SOLVED, -1, p, x, y, exerted, miss, motion)
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
-        compliance = planar_compliance(problem, normal, friction, turning, work)
+        compliance = planar_compliance(problem, normal, friction, turning, scratch.body)
         step, x, y, is_settled = _primal_dual_step(problem, on, p, friction, slip, compliance, delta, limits)
         may_open = not patient or (is_settled and miss <= problem.loose)
         motion = motion[0] + step[0], motion[1] + step[1], motion[2] + step[2]

@@ -52,26 +52,27 @@ _ROUND_TOLERANCE_SHARE = 0.01
 
 
 @inlined
-def _fixed_point_residual(n, factor, inv_mass, work):
-    """Write x - M⁻¹ Jᵀ p(x) into `work.defect`, p(x) into `work.trial`; return the defect's size as a velocity [m/s].
+def _fixed_point_residual(n, factor, inv_mass, scratch):
+    """Write x - M⁻¹ Jᵀ p(x) into `defect`, p(x) into `trial`; return the defect's size as a velocity [m/s].
 
-    `work.velocity` receives q - ρ u, which the derivative of the law is taken at.
+    `contacts.velocity` receives q - ρ u, which the derivative of the law is taken at.
     """
-    frame, angular, response = work.frame, work.angular, work.response
-    x, g, p, y, q = work.twist, work.defect, work.trial, work.velocity, work.impulse
+    body, contacts, solver = scratch.body, scratch.contacts, scratch.solver
+    frame, angular, response = contacts.frame, contacts.angular, contacts.response
+    x, g, p, y, q = solver.twist, solver.defect, solver.trial, contacts.velocity, contacts.impulse
     for c in range(6):
         g[c] = x[c]
     for i in range(n):
         r = 3 * i
-        rho = factor * work.local[i, LOCAL_NORMAL_RHO]
+        rho = factor * solver.local[i, LOCAL_NORMAL_RHO]
         for s in range(r, r + 3):
-            u = work.bias[s] + (
+            u = contacts.bias[s] + (
                 (frame[s, 0] * x[0] + frame[s, 1] * x[1] + frame[s, 2] * x[2])
                 + (angular[s, 0] * x[3] + angular[s, 1] * x[4] + angular[s, 2] * x[5])
             )
             y[s] = q[s] - rho * u
-        y[r] = scale_by_compliance(y[r], rho, work)
-        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * max(y[r], 0.0)
+        y[r] = scale_by_compliance(y[r], rho, body)
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), body.mu * max(y[r], 0.0)
         s = limit / size if size > limit else 1.0
         p[r], p[r + 1], p[r + 2] = max(y[r], 0.0), s * y[r + 1], s * y[r + 2]
         for s in range(r, r + 3):
@@ -79,30 +80,31 @@ def _fixed_point_residual(n, factor, inv_mass, work):
                 g[c] -= inv_mass * frame[s, c] * p[s]
                 g[c + 3] -= response[s, c] * p[s]
     linear = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
-    return math.sqrt(linear + work.radius * work.radius * (g[3] * g[3] + g[4] * g[4] + g[5] * g[5]))
+    return math.sqrt(linear + body.radius * body.radius * (g[3] * g[3] + g[4] * g[4] + g[5] * g[5]))
 
 
 @inlined
-def _jacobian_entry(s, c, work):
+def _jacobian_entry(s, c, contacts):
     """Entry c of row s of J."""
-    return work.frame[s, c] if c < 3 else work.angular[s, c - 3]
+    return contacts.frame[s, c] if c < 3 else contacts.angular[s, c - 3]
 
 
 @inlined
-def _fill_newton_matrix(n, factor, inv_mass, work):
+def _fill_newton_matrix(n, factor, inv_mass, scratch):
     """Fill the Newton matrix 1 - M⁻¹ Jᵀ p'(u) J after `_fixed_point_residual`, with -defect beside it (6 x 7)."""
-    A, y, frame, response = work.newton, work.velocity, work.frame, work.response
+    body, contacts, solver = scratch.body, scratch.contacts, scratch.solver
+    A, y, frame, response = solver.newton, contacts.velocity, contacts.frame, contacts.response
     for a in range(6):
         for b in range(6):
             A[a, b] = 0.0
         A[a, a] = 1.0
-        A[a, 6] = -work.defect[a]
+        A[a, 6] = -solver.defect[a]
     for i in range(n):
         r = 3 * i
         if not y[r] > 0.0:
             continue
-        rho = factor * work.local[i, LOCAL_NORMAL_RHO]
-        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), work.mu * y[r]
+        rho = factor * solver.local[i, LOCAL_NORMAL_RHO]
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), body.mu * y[r]
         da = db = 0.0
         k11 = k22 = 1.0
         k12 = 0.0
@@ -110,13 +112,13 @@ def _fill_newton_matrix(n, factor, inv_mass, work):
             da, db, s = y[r + 1] / size, y[r + 2] / size, limit / size
             k11, k12, k22 = s * (1.0 - da * da), -s * da * db, s * (1.0 - db * db)
         for b in range(6):
-            jn = scale_by_compliance(rho, rho, work) * _jacobian_entry(r, b, work)
-            ja, jb = rho * _jacobian_entry(r + 1, b, work), rho * _jacobian_entry(r + 2, b, work)
+            jn = scale_by_compliance(rho, rho, body) * _jacobian_entry(r, b, contacts)
+            ja, jb = rho * _jacobian_entry(r + 1, b, contacts), rho * _jacobian_entry(r + 2, b, contacts)
             pa = k11 * ja + k12 * jb
             pb = k12 * ja + k22 * jb
             if size > limit:
-                pa += work.mu * da * jn
-                pb += work.mu * db * jn
+                pa += body.mu * da * jn
+                pb += body.mu * db * jn
             for a in range(3):
                 A[a, b] += inv_mass * (frame[r, a] * jn + frame[r + 1, a] * pa + frame[r + 2, a] * pb)
                 A[a + 3, b] += response[r, a] * jn + response[r + 1, a] * pa + response[r + 2, a] * pb
@@ -145,11 +147,12 @@ def _eliminate(A):
 
 
 @inlined
-def _newton_step(n, size, factor, inv_mass, work):
+def _newton_step(n, size, factor, inv_mass, scratch):
     """Take one damped Newton step on the twist; return the new size of the defect."""
-    x, start, step = work.twist, work.start, work.newton
-    _fill_newton_matrix(n, factor, inv_mass, work)
-    _eliminate(work.newton)
+    solver = scratch.solver
+    x, start, step = solver.twist, solver.start, solver.newton
+    _fill_newton_matrix(n, factor, inv_mass, scratch)
+    _eliminate(solver.newton)
     for c in range(6):
         start[c] = x[c]
     after = size
@@ -157,7 +160,7 @@ def _newton_step(n, size, factor, inv_mass, work):
     for _ in range(_MAX_HALVINGS):
         for c in range(6):
             x[c] = start[c] + t * step[c, 6]
-        after = _fixed_point_residual(n, factor, inv_mass, work)
+        after = _fixed_point_residual(n, factor, inv_mass, scratch)
         if after < size:
             break
         t *= 0.5
@@ -165,26 +168,27 @@ def _newton_step(n, size, factor, inv_mass, work):
 
 
 @inlined
-def _twist_of_impulses(n, inv_mass, work):
-    """Twist x = M⁻¹ Jᵀ p of `work.impulse`."""
-    x, p = work.twist, work.impulse
+def _twist_of_impulses(n, inv_mass, scratch):
+    """Twist x = M⁻¹ Jᵀ p of `contacts.impulse`."""
+    contacts = scratch.contacts
+    x, p = scratch.solver.twist, contacts.impulse
     for c in range(6):
         x[c] = 0.0
     for s in range(3 * n):
         for c in range(3):
-            x[c] += inv_mass * work.frame[s, c] * p[s]
-            x[c + 3] += work.response[s, c] * p[s]
+            x[c] += inv_mass * contacts.frame[s, c] * p[s]
+            x[c + 3] += contacts.response[s, c] * p[s]
 
 
 @kernel
-def proximal_newton(n, residual, goal, is_quick, work):
+def proximal_newton(n, residual, goal, is_quick, scratch):
     """Improve the impulses of an assembled contact problem with friction until the residual is within `goal`.
 
     Parameters
     ----------
     n : int
-        Contacts in `work`: what `assemble` and `invert_contact_blocks` fill is read; `work.impulse` is the start and
-        receives the result, `work.velocity` the contact velocities.
+        Contacts in `scratch`: what `assemble` and `invert_contact_blocks` fill is read; `contacts.impulse` is the start
+        and receives the result, `contacts.velocity` the contact velocities.
     residual, goal : float
         Residual of the start, and tolerance [m/s].
     is_quick : bool
@@ -197,22 +201,23 @@ def proximal_newton(n, residual, goal, is_quick, work):
     residual : float
         [m/s], measured on the impulses returned: the best met.
     """
-    p, u, W = work.impulse, work.velocity, work.delassus
+    contacts, solver = scratch.contacts, scratch.solver
+    p, u, W = contacts.impulse, contacts.velocity, contacts.delassus
     rows = 3 * n
-    inv_mass = 1.0 / work.mass
+    inv_mass = 1.0 / scratch.body.mass
     steps = 0
     factor = _PROXIMAL_FACTOR
     rounds, most = (_QUICK_ROUNDS, _QUICK_NEWTON_STEPS) if is_quick else (_MAX_ROUNDS, _MAX_NEWTON_STEPS)
     for s in range(rows):
-        work.saved[s] = p[s]
+        solver.saved[s] = p[s]
     for _ in range(rounds):
-        _twist_of_impulses(n, inv_mass, work)
-        size = _fixed_point_residual(n, factor, inv_mass, work)
+        _twist_of_impulses(n, inv_mass, scratch)
+        size = _fixed_point_residual(n, factor, inv_mass, scratch)
         failures = 0
         for _ in range(most):
             if not size > _ROUND_TOLERANCE_SHARE * goal:
                 break
-            after = _newton_step(n, size, factor, inv_mass, work)
+            after = _newton_step(n, size, factor, inv_mass, scratch)
             steps += 1
             if not after < size:
                 failures += 1
@@ -220,17 +225,17 @@ def proximal_newton(n, residual, goal, is_quick, work):
                     break
             size = after
         for s in range(rows):
-            p[s] = work.trial[s]
-        update_contact_velocities(rows, W, p, work.bias, u)
-        now = cone_residual(n, p, u, work.friction, work.local)
+            p[s] = solver.trial[s]
+        update_contact_velocities(rows, W, p, contacts.bias, u)
+        now = cone_residual(n, p, u, contacts.friction, solver.local)
         if now < residual:
             residual = now
             for s in range(rows):
-                work.saved[s] = p[s]
+                solver.saved[s] = p[s]
         if residual <= goal:
             break
         factor = min(_FACTOR_GROWTH * factor, _FACTOR_LIMIT)
     for s in range(rows):
-        p[s] = work.saved[s]
-    update_contact_velocities(rows, W, p, work.bias, u)
+        p[s] = solver.saved[s]
+    update_contact_velocities(rows, W, p, contacts.bias, u)
     return steps, residual

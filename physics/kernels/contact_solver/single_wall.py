@@ -21,7 +21,7 @@ _CLOSING_TOLERANCE = 1.0e-2
 
 
 class WallSolution(NamedTuple):
-    """Impulses of all contacts of one wall, in its stretched frame; those of each contact are in `work.impulse`.
+    """Impulses of all contacts of one wall, in its stretched frame; those of each contact are in `contacts.impulse`.
 
     Attributes
     ----------
@@ -45,25 +45,25 @@ class WallSolution(NamedTuple):
 
 
 @inlined
-def _solve_face(n, friction, body, work):
-    """Solve three or four contacts; write `work.impulse` if a solution is found."""
-    patch, on = gather_patch(n, body, work), valid_lanes_mask(n)
+def _solve_face(n, friction, body, scratch):
+    """Solve three or four contacts; write `contacts.impulse` if a solution is found."""
+    patch, on = gather_patch(n, body, scratch), valid_lanes_mask(n)
     scale = largest_free_speed(friction, patch, body)
     start, is_mixed = (body.u[1], body.u[2], body.w[0]), False
     if friction is not None:
-        start, is_of_now = warm_start_motion(n, patch, on, body, work)
-        is_mixed = is_of_now and work.mode == TRY_MIXED
-        if not is_of_now and work.mu > 0.0:
-            start = cold_start_motion(n, patch, on, work.mu, body)
-    goal = work.tolerance * scale
+        start, is_of_now = warm_start_motion(n, patch, on, body, scratch)
+        is_mixed = is_of_now and scratch.stage.mode == TRY_MIXED
+        if not is_of_now and scratch.body.mu > 0.0:
+            start = cold_start_motion(n, patch, on, scratch.body.mu, body)
+    goal = scratch.settings.tolerance * scale
     loose = max(goal, _CLOSING_TOLERANCE * scale) if n > 3 else goal
-    problem = PatchProblem(patch, body, work.mu, goal, loose)
+    problem = PatchProblem(patch, body, scratch.body.mu, goal, loose)
     for patient in range(2):
-        face, has_opened = solve_sliding_patch(n, patient > 0, problem, start, is_mixed, work)
+        face, has_opened = solve_sliding_patch(n, patient > 0, problem, start, is_mixed, scratch)
         if face.found:
             p, x, y = face.impulses
             for i in range(n):
-                _store_impulse(i, (p[i], x[i], y[i]), friction, work)
+                _store_impulse(i, (p[i], x[i], y[i]), friction, scratch)
             return WallSolution(True, face.exerted, face.push, face.residual, scale)
         if not has_opened:
             break
@@ -71,13 +71,14 @@ def _solve_face(n, friction, body, work):
 
 
 @inlined
-def _store_impulse(i, p, friction, work):
-    """Write the impulse of contact i to `work.impulse`, along the unit tangents."""
+def _store_impulse(i, p, friction, scratch):
+    """Write the impulse of contact i to `contacts.impulse`, along the unit tangents."""
+    contacts = scratch.contacts
     if friction is None:
-        work.impulse[i] = p[0]
+        contacts.impulse[i] = p[0]
     else:
-        work.impulse[3 * i], work.impulse[3 * i + 1] = p[0], p[1]
-        work.impulse[3 * i + 2] = friction_ratio(work) * p[2]
+        contacts.impulse[3 * i], contacts.impulse[3 * i + 1] = p[0], p[1]
+        contacts.impulse[3 * i + 2] = friction_ratio(scratch.body) * p[2]
 
 
 @inlined
@@ -89,36 +90,38 @@ def _largest_component(friction, b):
 
 
 @inlined
-def _solve_one_or_two(n, friction, body, work):
+def _solve_one_or_two(n, friction, body, scratch):
     """Solve one or two contacts, like `_solve_face`."""
-    first = contact_in_wall_frame(0, body, work)
+    first = contact_in_wall_frame(0, body, scratch)
     scale = _largest_component(friction, first.approach)
     if n == 1:
-        found, p, m, miss = solve_one_contact(first, work.mu, work.tolerance * scale, body, work)
+        found, p, m, miss = solve_one_contact(first, scratch.body.mu, scratch.settings.tolerance * scale, body, scratch)
     else:
-        second = contact_in_wall_frame(1, body, work)
+        second = contact_in_wall_frame(1, body, scratch)
         scale = max(scale, _largest_component(friction, second.approach))
-        found, p, q, m, miss = solve_two_contacts(first, second, work.mu, work.tolerance * scale, body, work)
+        found, p, q, m, miss = solve_two_contacts(
+            first, second, scratch.body.mu, scratch.settings.tolerance * scale, body, scratch
+        )
         if found:
-            _store_impulse(1, q, friction, work)
-            work.mode = TRY_SLIDING
+            _store_impulse(1, q, friction, scratch)
+            scratch.stage.mode = TRY_SLIDING
     if found:
-        _store_impulse(0, p, friction, work)
+        _store_impulse(0, p, friction, scratch)
     if n == 2:
         p = p[0] + q[0], p[1] + q[1], p[2] + q[2]
     return WallSolution(found, (p[1], p[2], m[0], m[1], m[2]), p[0], miss, scale)
 
 
 @inlined
-def solve_single_wall(n, friction, wall, R, v, L, work):
+def solve_single_wall(n, friction, wall, R, v, L, scratch):
     """Try the impulses with which the n contacts of one wall slide, open, or turn about a sticking one.
 
     Parameters
     ----------
     n : int
-        Contacts in `work`, four at most: arm, target, slot and impulse (the warm start) are read.
+        Contacts in `scratch`, four at most: arm, target, slot and impulse (the warm start) are read.
     friction : True or None
-        None: frictionless, `work.mu` is 0 and `work.impulse` has one number per contact.
+        None: frictionless, `scratch.body.mu` is 0 and `contacts.impulse` has one number per contact.
     wall : int
         The wall.
     R : tuple of 9 floats
@@ -129,20 +132,20 @@ def solve_single_wall(n, friction, wall, R, v, L, work):
     Returns
     -------
     found : bool
-        Whether `work.impulse` was written; `work.mode` then says what to try first next time.
+        Whether `contacts.impulse` was written; `stage.mode` then says what to try first next time.
     v, L : tuples of 3 floats
         With the contact impulses, when found.
     residual : float
         Relative to the largest free contact speed.
     """
-    axes, inv_mass, ratio = wall_axes(work.walls, wall), 1.0 / work.mass, friction_ratio(work)
-    K, u, w = motion_in_wall_frame(R, v, L, axes, work.J)
+    axes, inv_mass, ratio = wall_axes(scratch.scene.walls, wall), 1.0 / scratch.body.mass, friction_ratio(scratch.body)
+    K, u, w = motion_in_wall_frame(R, v, L, axes, scratch.body.J)
     K, u, w = stretched_frame(K, u, w, ratio)
     body = FreeBody(axes, u, w, K, inv_mass)
     if n < 3:
-        solved = _solve_one_or_two(n, friction, body, work)
+        solved = _solve_one_or_two(n, friction, body, scratch)
     else:
-        solved = _solve_face(n, friction, body, work)
+        solved = _solve_face(n, friction, body, scratch)
     if not solved.found:
         return False, v, L, 0.0
     miss = solved.residual

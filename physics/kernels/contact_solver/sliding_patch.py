@@ -75,7 +75,7 @@ from physics.kernels.math.simd_gather import select_lane, valid_lanes_mask
 # one more.
 _MAX_PATCH_SOLVES = 16
 
-# What to try first (`work.mode`): all hold, all slide, or some of both.
+# What to try first (`stage.mode`): all hold, all slide, or some of both.
 TRY_STICKING, TRY_SLIDING, TRY_MIXED = range(3)
 
 # What a round comes to, beside `primal_dual_friction.ROUND_FAILED`, `ROUND_SOLVED` and `ROUND_PULLS`.
@@ -185,7 +185,7 @@ def _choose_normal_motion(pushing, choice, problem):
 
 
 @inlined
-def _solve_remaining_pair(on, problem, work):
+def _solve_remaining_pair(on, problem, scratch):
     """Solve the two contacts that still push, with the others open.
 
     Returns
@@ -199,8 +199,8 @@ def _solve_remaining_pair(on, problem, work):
     u, w, K, inv_mass = body.u, body.w, body.K, body.inv_mass
     i = first_true_lane(on > 0.0)
     j = first_true_lane(select_lanes(select_lane(i), 0.0, on) > 0.0)
-    first, second = contact_in_wall_frame(i, body, work), contact_in_wall_frame(j, body, work)
-    found, p, q, m, miss = solve_two_contacts(first, second, problem.mu, goal, body, work)
+    first, second = contact_in_wall_frame(i, body, scratch), contact_in_wall_frame(j, body, scratch)
+    found, p, q, m, miss = solve_two_contacts(first, second, problem.mu, goal, body, scratch)
     is_i, is_j = select_lane(i), select_lane(j)
     impulses = (
         select_lanes(is_i, p[0], select_lanes(is_j, q[0], 0.0)),
@@ -218,7 +218,7 @@ def _solve_remaining_pair(on, problem, work):
 
 
 @inlined
-def _direction_newton_round(patient, pushing, problem, normal, motion, work):
+def _direction_newton_round(patient, pushing, problem, normal, motion, scratch):
     """Take one round of Newton's method on the directions of `motion`.
 
     Returns
@@ -241,13 +241,13 @@ def _direction_newton_round(patient, pushing, problem, normal, motion, work):
         if not patient and pushing.count > 3 and lane_sum(pulling) == 2.0:
             what = ROUND_TIPS
     if loser < 0 or patient:
-        led_to = planar_motion_after(exerted, problem.body, work)
+        led_to = planar_motion_after(exerted, problem.body, scratch)
         delta = led_to[0] - motion[0], led_to[1] - motion[1], led_to[2] - motion[2]
         miss, k = patch_sliding_residual(patch, p, friction, mu, delta)
         if loser < 0 and miss <= problem.goal:
             what = ROUND_SOLVED
         else:
-            compliance = planar_compliance(problem, normal, friction, turning, work)
+            compliance = planar_compliance(problem, normal, friction, turning, scratch.body)
             step = solve_planar_step(compliance, (k[0], k[1], k[2], k[1], k[3], k[4], k[2], k[4], k[5]), delta)
             if not has_small_turns(patch, on, friction, mu, step):
                 what = ROUND_REVERSES
@@ -275,7 +275,7 @@ def _open_pulling(current, pulling, pushing):
 
 
 @inlined
-def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
+def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, scratch):
     """Take one round on the directions; where they do not settle, take all rounds of `primal_dual_friction`.
 
     Returns
@@ -288,19 +288,19 @@ def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work):
     """
     none = Lanes(0.0, 0.0, 0.0, 0.0)
     if is_mixed:
-        x, y = warm_start_friction(n, pushing.on, work)
+        x, y = warm_start_friction(n, pushing.on, scratch)
         current, pulling = PatchRound(ROUND_REVERSES, -1, none, x, y, (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, motion), none
     else:
-        current, pulling = _direction_newton_round(patient, pushing, problem, normal, motion, work)
+        current, pulling = _direction_newton_round(patient, pushing, problem, normal, motion, scratch)
     mode = TRY_SLIDING
     if current.what == ROUND_REVERSES:
         x, y, motion, mode = current.x, current.y, current.motion, TRY_MIXED
-        current = solve_stick_slip_patch(patient, pushing.on, x, y, problem, normal, motion, work)
+        current = solve_stick_slip_patch(patient, pushing.on, x, y, problem, normal, motion, scratch)
     return current, pulling, mode
 
 
 @inlined
-def solve_sliding_patch(n, patient, problem, start, is_mixed, work):
+def solve_sliding_patch(n, patient, problem, start, is_mixed, scratch):
     """Find the directions, and the contacts that push.
 
     Parameters
@@ -314,12 +314,12 @@ def solve_sliding_patch(n, patient, problem, start, is_mixed, work):
     start : tuple of 3 floats
         Planar motion to start from.
     is_mixed : bool
-        Whether some contacts held in the stage before: then its impulses in `work` are the start.
+        Whether some contacts held in the stage before: then its impulses in `scratch` are the start.
 
     Returns
     -------
     PatchSolution
-        When it is found by a round, `work.mode` says by which method.
+        When it is found by a round, `stage.mode` says by which method.
     has_opened : bool
         Whether a contact was opened since it pulled: else patience changes nothing.
     """
@@ -333,22 +333,22 @@ def solve_sliding_patch(n, patient, problem, start, is_mixed, work):
                 break
             pushing, is_set, again = _push_again(again, pushing), False, -1
         if pushing.count < 3:
-            pair, again = _solve_remaining_pair(pushing.on, problem, work)
+            pair, again = _solve_remaining_pair(pushing.on, problem, scratch)
             if again < 0:
                 return pair, has_opened
-            motion = planar_motion_after(pair.exerted, problem.body, work)
+            motion = planar_motion_after(pair.exerted, problem.body, scratch)
             continue
         if not is_set:
             pushing, center, choice = _choose_normal_motion(pushing, choice, problem)
             if not choice.ok:
                 break
             normal, is_set = normal_motion_about(pushing.count, center, choice.motion, problem.body), True
-        current, pulling, mode = _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, work)
+        current, pulling, mode = _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, scratch)
         motion, is_mixed = current.motion, False
         if current.what == ROUND_FAILED:
             break
         if current.what == ROUND_SOLVED and choice.closing < 0:
-            work.mode, p = mode, current.p
+            scratch.stage.mode, p = mode, current.p
             impulses = p, p * current.x, p * current.y
             return PatchSolution(True, impulses, current.exerted, normal.push, current.miss), has_opened
         if current.what == ROUND_SOLVED:

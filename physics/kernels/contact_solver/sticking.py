@@ -23,7 +23,7 @@ cone at the end, this solves the contact problem exactly; otherwise the contacts
 Targets of contacts that hold need not be those of a rigid motion: `target_velocity.set_resting_targets` moves points of
 a turning body apart, by nanometres a step when it is about to hold. Met exactly, all of them would slide, and friction
 would be spent on that. They are replaced by those of the twist that fits them best where that changes them by less
-than `work.target_error_limit`.
+than `stage.target_error_limit`.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class FreeMotion(NamedTuple):
 
 
 class BoltGroup(NamedTuple):
-    """Sticking contacts, flagged in `work.active`, world frame.
+    """Sticking contacts, flagged in `solver.active`, world frame.
 
     Attributes
     ----------
@@ -94,21 +94,22 @@ class BoltGroup(NamedTuple):
 
 
 @inlined
-def _bolt_group(n, count, work):
+def _bolt_group(n, count, scratch):
     """The `BoltGroup` of the active contacts."""
+    contacts = scratch.contacts
     cx = cy = cz = 0.0
     for i in range(n):
-        if work.active[i] == 0:
+        if scratch.solver.active[i] == 0:
             continue
-        cx += work.arm[i, 0]
-        cy += work.arm[i, 1]
-        cz += work.arm[i, 2]
+        cx += contacts.arm[i, 0]
+        cy += contacts.arm[i, 1]
+        cz += contacts.arm[i, 2]
     c = (cx / count, cy / count, cz / count)
     xx = xy = xz = yy = yz = zz = 0.0
     for i in range(n):
-        if work.active[i] == 0:
+        if scratch.solver.active[i] == 0:
             continue
-        x, y, z = minus(contact_arm(work, i), c)
+        x, y, z = minus(contact_arm(contacts, i), c)
         xx += x * x
         xy += x * y
         xz += x * z
@@ -126,10 +127,11 @@ def _is_collinear(k):
 
 
 @inlined
-def _world_target(i, work):
+def _world_target(i, scratch):
     """Target velocity of contact i in the world frame."""
-    n, a, b = work.target[i, 0], work.target[i, 1], work.target[i, 2]
-    walls, wall = work.walls, wall_of(work.slot[i], work)
+    contacts = scratch.contacts
+    n, a, b = contacts.target[i, 0], contacts.target[i, 1], contacts.target[i, 2]
+    walls, wall = scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene)
     return (
         n * walls[wall, WALL_NORMAL] + a * walls[wall, WALL_TANGENT_1] + b * walls[wall, WALL_TANGENT_2],
         n * walls[wall, WALL_NORMAL + 1] + a * walls[wall, WALL_TANGENT_1 + 1] + b * walls[wall, WALL_TANGENT_2 + 1],
@@ -138,58 +140,61 @@ def _world_target(i, work):
 
 
 @inlined
-def _largest_target_speed(n, work):
+def _largest_target_speed(n, contacts):
     largest = 0.0
     for i in range(n):
         for c in range(3):
-            largest = max(largest, abs(work.target[i, c]))
+            largest = max(largest, abs(contacts.target[i, c]))
     return largest
 
 
 @inlined
-def _target_moments(n, group, work):
+def _target_moments(n, group, scratch):
     """Mean of the target velocities, and Σ d_i x t_i."""
     count, c = group.count, group.center
     s = (0.0, 0.0, 0.0)
     m = (0.0, 0.0, 0.0)
     for i in range(n):
-        if work.active[i] == 0:
+        if scratch.solver.active[i] == 0:
             continue
-        t = _world_target(i, work)
-        d = qt.cross(minus(contact_arm(work, i), c), t)
+        t = _world_target(i, scratch)
+        d = qt.cross(minus(contact_arm(scratch.contacts, i), c), t)
         s = (s[0] + t[0], s[1] + t[1], s[2] + t[2])
         m = (m[0] + d[0], m[1] + d[1], m[2] + d[2])
     return (s[0] / count, s[1] / count, s[2] / count), m
 
 
 @inlined
-def _target_residual(n, v, w, work):
+def _target_residual(n, v, w, scratch):
     """Largest distance of contact velocities from their targets.
 
     A contact without impulse may separate faster than asked.
     """
-    walls = work.walls
+    walls = scratch.scene.walls
     worst = 0.0
     for i in range(n):
-        m = qt.cross(w, contact_arm(work, i))
-        t = _world_target(i, work)
+        m = qt.cross(w, contact_arm(scratch.contacts, i))
+        t = _world_target(i, scratch)
         d = (v[0] + m[0] - t[0], v[1] + m[1] - t[1], v[2] + m[2] - t[2])
-        if work.normal[i] > 0.0:
+        if scratch.solver.normal[i] > 0.0:
             worst = max(worst, math.sqrt(qt.dot(d, d)))
         else:
-            worst = max(worst, -qt.dot(wall_axis(walls, wall_of(work.slot[i], work), WALL_NORMAL), d))
+            worst = max(
+                worst, -qt.dot(wall_axis(walls, wall_of(scratch.contacts.slot[i], scratch.scene), WALL_NORMAL), d)
+            )
     return worst
 
 
 @inlined
-def _angular_velocity_about_line(n, group, vc, m, free, work):
+def _angular_velocity_about_line(n, group, vc, m, free, scratch):
     """Angular velocity of a body held at points on a line.
 
     Across the line it is the least-squares fit Σ d x t / Σ|d|². Along the unit vector e it is α with
     e·(I ω - L - c x m (v₁ - v)) = 0, v₁ = v_c - ω x c: the contacts exert no moment about the line.
     """
-    J, c, k, (R, v, L) = work.J, group.center, group.second, free
-    first = minus(contact_arm(work, first_active(n, work)), c)
+    body = scratch.body
+    J, c, k, (R, v, L) = body.J, group.center, group.second, free
+    first = minus(contact_arm(scratch.contacts, first_active(n, scratch.solver)), c)
     size2 = 0.5 * (k[0] + k[3] + k[5])
     s = 1.0 / math.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
     e = (s * first[0], s * first[1], s * first[2])
@@ -200,15 +205,15 @@ def _angular_velocity_about_line(n, group, vc, m, free, work):
     wc = qt.cross(w, c)
     ec = qt.cross(e, c)
     gain = (vc[0] - wc[0] - v[0], vc[1] - wc[1] - v[1], vc[2] - wc[2] - v[2])
-    top = qt.dot(e, L) - qt.dot(Ie, wb) + work.mass * qt.dot(ec, gain)
-    alpha = top / (qt.dot(Ie, eb) + work.mass * qt.dot(ec, ec))
+    top = qt.dot(e, L) - qt.dot(Ie, wb) + body.mass * qt.dot(ec, gain)
+    alpha = top / (qt.dot(Ie, eb) + body.mass * qt.dot(ec, ec))
     return (w[0] + alpha * e[0], w[1] + alpha * e[1], w[2] + alpha * e[2])
 
 
 @inlined
-def _point_impulse(r, t, free, work):
+def _point_impulse(r, t, free, body):
     """Impulse at r that gives the point the velocity t, by its inverse mass in the principal frame."""
-    J, q, (R, v, L) = work.J, 1.0 / work.mass, free
+    J, q, (R, v, L) = body.J, 1.0 / body.mass, free
     x, y, z = qt.transposed_matvec(R, r)
     Lb = qt.transposed_matvec(R, L)
     wb = (J[0] * Lb[0], J[1] * Lb[1], J[2] * Lb[2])
@@ -223,21 +228,21 @@ def _point_impulse(r, t, free, work):
 
 
 @inlined
-def _sticking_twist(n, group, no_target, free, work):
+def _sticking_twist(n, group, no_target, free, scratch):
     """Velocity and angular velocity of the body with the active contacts on their targets."""
     zero = (0.0, 0.0, 0.0)
     if no_target and not group.is_line:
         return zero, zero
     c = group.center
-    vc, m = _target_moments(n, group, work)
+    vc, m = _target_moments(n, group, scratch)
     if group.count == 1:
-        J, R, L = work.J, free.R, free.L
-        P = _point_impulse(c, vc, free, work)
+        J, R, L = scratch.body.J, free.R, free.L
+        P = _point_impulse(c, vc, free, scratch.body)
         m = qt.cross(c, P)
         b = qt.transposed_matvec(R, (L[0] + m[0], L[1] + m[1], L[2] + m[2]))
         w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
     elif group.is_line:
-        w = _angular_velocity_about_line(n, group, vc, m, free, work)
+        w = _angular_velocity_about_line(n, group, vc, m, free, scratch)
     else:
         w = solve_symmetric(group.second, m)
     return minus(vc, qt.cross(w, c)), w
@@ -256,59 +261,60 @@ def _solve_bolt_group(group, T):
 
 
 @inlined
-def _restore_moment(n, group, T, work):
+def _restore_moment(n, group, T, scratch):
     """Restore the moment T of the impulses of `distribute_by_load`; True if they stay in their cones.
 
     `distribute_by_load` assumes that all contacts are equally deep in the wall, which holds to a few slops. The missing
     moment ΔT makes one more bolt group, (K⁻¹ ΔT) x d_i.
     """
-    walls, c = work.walls, group.center
+    scene, contacts, solver = scratch.scene, scratch.contacts, scratch.solver
+    walls, c = scene.walls, group.center
     mx, my, mz = T
     for i in range(n):
-        if work.active[i] == 0:
+        if solver.active[i] == 0:
             continue
-        wall, d = wall_of(work.slot[i], work), minus(contact_arm(work, i), c)
-        pn, pa, pb = work.normal[i], work.across[i, 0], work.across[i, 1]
+        wall, d = wall_of(contacts.slot[i], scene), minus(contact_arm(contacts, i), c)
+        pn, pa, pb = solver.normal[i], solver.across[i, 0], solver.across[i, 1]
         p = wall_to_world(wall_axes(walls, wall), pn, pa, pb, (0.0, 0.0, 0.0))
         m = qt.cross(d, p)
         mx, my, mz = mx - m[0], my - m[1], mz - m[2]
     a = _solve_bolt_group(group, (mx, my, mz))
     for i in range(n):
-        if work.active[i] == 0:
+        if solver.active[i] == 0:
             continue
-        wall = wall_of(work.slot[i], work)
-        p = qt.cross(a, minus(contact_arm(work, i), c))
-        pn = work.normal[i] + qt.dot(wall_axis(walls, wall, WALL_NORMAL), p)
-        pa = work.across[i, 0] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p)
-        pb = work.across[i, 1] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
-        work.normal[i], work.across[i, 0], work.across[i, 1] = pn, pa, pb
-        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, work)):
+        wall = wall_of(contacts.slot[i], scene)
+        p = qt.cross(a, minus(contact_arm(contacts, i), c))
+        pn = solver.normal[i] + qt.dot(wall_axis(walls, wall, WALL_NORMAL), p)
+        pa = solver.across[i, 0] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p)
+        pb = solver.across[i, 1] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
+        solver.normal[i], solver.across[i, 0], solver.across[i, 1] = pn, pa, pb
+        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, scratch.body)):
             return False
     return True
 
 
 @inlined
-def _largest_free_speed(n, free, work):
+def _largest_free_speed(n, free, scratch):
     """Largest contact velocity without impulses, relative to the target [m/s]: the scale of a residual."""
-    J, (R, v, L) = work.J, free
+    J, (R, v, L) = scratch.body.J, free
     b = qt.transposed_matvec(R, L)
     w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
     largest = 0.0
     for i in range(n):
-        m = qt.cross(w, contact_arm(work, i))
-        t = _world_target(i, work)
+        m = qt.cross(w, contact_arm(scratch.contacts, i))
+        t = _world_target(i, scratch)
         largest = max(largest, abs(v[0] + m[0] - t[0]), abs(v[1] + m[1] - t[1]), abs(v[2] + m[2] - t[2]))
     return largest
 
 
 @inlined
-def solve_all_sticking(n, R, v, L, work):
+def solve_all_sticking(n, R, v, L, scratch):
     """Try the impulses with which all n contacts move at their target velocities.
 
     Parameters
     ----------
     n : int
-        Contacts in `work` (arm, target and slot are read; impulse is written when it succeeds).
+        Contacts in `scratch` (arm, target and slot are read; impulse is written when it succeeds).
     R : tuple of 9 floats
         Principal frame to world.
     v, L : tuple of 3 floats
@@ -317,42 +323,43 @@ def solve_all_sticking(n, R, v, L, work):
     Returns
     -------
     found : bool
-        False: some contact would have to pull or to slide. `work.impulse` is then as it was.
+        False: some contact would have to pull or to slide. `contacts.impulse` is then as it was.
     v, L : tuple of 3 floats
         With the contact impulses, when found.
     """
-    J, mass, free = work.J, work.mass, FreeMotion(R, v, L)
-    largest = _largest_target_speed(n, work)
+    contacts, solver = scratch.contacts, scratch.solver
+    J, mass, free = scratch.body.J, scratch.body.mass, FreeMotion(R, v, L)
+    largest = _largest_target_speed(n, contacts)
     for i in range(n):
-        work.active[i] = 1
+        solver.active[i] = 1
     count = n
     while count > 0:
-        group = _bolt_group(n, count, work)
-        v_new, w_new = _sticking_twist(n, group, largest == 0.0, free, work)
+        group = _bolt_group(n, count, scratch)
+        v_new, w_new = _sticking_twist(n, group, largest == 0.0, free, scratch)
         wb = qt.transposed_matvec(R, w_new)
         L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
         F = (mass * (v_new[0] - v[0]), mass * (v_new[1] - v[1]), mass * (v_new[2] - v[2]))
         m = qt.cross(group.center, F)
         T = (L_new[0] - L[0] - m[0], L_new[1] - L[1] - m[1], L_new[2] - L[2] - m[2])
         a = _solve_bolt_group(group, T)
-        loser, holds = distribute_by_bolt_group(n, count, group.center, F, a, work)
+        loser, holds = distribute_by_bolt_group(n, count, group.center, F, a, scratch)
         if loser < 0:
-            if not holds and not (distribute_by_load(n, work) and _restore_moment(n, group, T, work)):
+            if not holds and not (distribute_by_load(n, scratch) and _restore_moment(n, group, T, scratch)):
                 return False, v, L, 0.0
             residual = 0.0
             if largest > 0.0 or count < n:
-                miss = _target_residual(n, v_new, w_new, work)
+                miss = _target_residual(n, v_new, w_new, scratch)
                 if not miss <= _RIGID_TWIST_TOLERANCE * largest:
-                    if miss > work.target_error_limit:
-                        residual = miss / _largest_free_speed(n, free, work)
-                    if not residual <= work.tolerance:
+                    if miss > scratch.stage.target_error_limit:
+                        residual = miss / _largest_free_speed(n, free, scratch)
+                    if not residual <= scratch.settings.tolerance:
                         return False, v, L, 0.0
             for i in range(n):
-                work.impulse[3 * i] = work.normal[i]
-                work.impulse[3 * i + 1] = work.across[i, 0]
-                work.impulse[3 * i + 2] = work.across[i, 1]
+                contacts.impulse[3 * i] = solver.normal[i]
+                contacts.impulse[3 * i + 1] = solver.across[i, 0]
+                contacts.impulse[3 * i + 2] = solver.across[i, 1]
             return True, v_new, L_new, residual
-        work.active[loser] = 0
-        work.normal[loser] = work.across[loser, 0] = work.across[loser, 1] = 0.0
+        solver.active[loser] = 0
+        solver.normal[loser] = solver.across[loser, 0] = solver.across[loser, 1] = 0.0
         count -= 1
     return False, v, L, 0.0

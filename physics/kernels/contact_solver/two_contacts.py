@@ -239,10 +239,12 @@ def solve_block_pair(pair, first, second):
 
 
 @inlined
-def solve_one_contact(contact, mu, goal, body, work):
+def solve_one_contact(contact, mu, goal, body, scratch):
     """Impulse of a single `WallContact`: (found, impulse [N s], moment [N m s], residual [m/s])."""
     r, b, impulse = contact
-    W = add_block_compliance(diagonal_delassus_block(r, body.inv_mass, friction_ratio(work), body.K), work)
+    W = add_block_compliance(
+        diagonal_delassus_block(r, body.inv_mass, friction_ratio(scratch.body), body.K), scratch.body
+    )
     x = y = 0.0
     if mu > 0.0:
         f = qt.matvec(W, impulse)
@@ -270,7 +272,7 @@ def _frictionless_response(pair):
 
 
 @inlined
-def solve_two_contacts(first, second, mu, goal, body, work):
+def solve_two_contacts(first, second, mu, goal, body, scratch):
     """Solve two contacts: their impulses.
 
     Parameters
@@ -293,10 +295,10 @@ def solve_two_contacts(first, second, mu, goal, body, work):
         [m/s].
     """
     (r, b1, f), (s, b2, g) = first, second
-    inv_mass, K, ratio = body.inv_mass, body.K, friction_ratio(work)
+    inv_mass, K, ratio = body.inv_mass, body.K, friction_ratio(scratch.body)
     W11, W22 = (
-        add_block_compliance(diagonal_delassus_block(r, inv_mass, ratio, K), work),
-        add_block_compliance(diagonal_delassus_block(s, inv_mass, ratio, K), work),
+        add_block_compliance(diagonal_delassus_block(r, inv_mass, ratio, K), scratch.body),
+        add_block_compliance(diagonal_delassus_block(s, inv_mass, ratio, K), scratch.body),
     )
     W12 = delassus_block(r, s, inv_mass, ratio, K)
     pair, directions = PairProblem(W11, W12, W22, b1, b2, mu, goal), ((0.0, 0.0), (0.0, 0.0))

@@ -41,37 +41,38 @@ _PAINLEVE_PUSH = 0.03
 
 
 @inlined
-def set_up_contact(i, slot, r, target, work):
+def set_up_contact(i, slot, r, target, contacts):
     """Set up contact i of a problem for `contact_solver.solve.solve_contacts`, without a warm start."""
-    work.slot[i] = slot
-    work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
-    work.target[i, 0], work.target[i, 1], work.target[i, 2] = target
-    work.impulse[3 * i] = work.impulse[3 * i + 1] = work.impulse[3 * i + 2] = 0.0
+    contacts.slot[i] = slot
+    contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2] = r
+    contacts.target[i, 0], contacts.target[i, 1], contacts.target[i, 2] = target
+    contacts.impulse[3 * i] = contacts.impulse[3 * i + 1] = contacts.impulse[3 * i + 2] = 0.0
 
 
 @kernel
-def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, work, candidates):
-    """Write the contact problem of candidates that do not slide into `work`; return the free (acceleration, moment).
+def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, scratch, candidates):
+    """Write the contact problem of candidates that do not slide into `scratch`; return the free (acceleration, moment).
 
     The problem is that of an impact, with the free acceleration for the velocity, the moment τ - ω x L for the angular
     momentum, and forces for impulses. The motion of an arm adds to a contact's acceleration, which is made part of its
     target. `has_sliding`: some of the candidates slide (`candidate_direction`).
     """
-    walls = work.walls
-    scale = acceleration_scale(w, work)
+    scene, body = scratch.scene, scratch.body
+    walls = scene.walls
+    scale = acceleration_scale(w, body)
     for i in range(count):
         slot = candidates.slot[i]
-        axes = wall_axes(walls, wall_of(slot, work))
+        axes = wall_axes(walls, wall_of(slot, scene))
         r, rate = contact_arm_and_rate(
-            work.shape, as_vector(work.dims), R, w, axes[0], feature_of(slot, work), offset_frame, work
+            body.shape, as_vector(body.dims), R, w, axes[0], feature_of(slot, scene), offset_frame, body
         )
         c = qt.cross(w, rate)
         if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
             c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(candidates.direction, i, 0)))
-        set_up_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), work)
-    work.mode = TRY_STICKING
-    g, t = qt.cross(w, y[3]), work.torque
-    return as_vector(work.free_acceleration), (t[0] - g[0], t[1] - g[1], t[2] - g[2])
+        set_up_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), scratch.contacts)
+    scratch.stage.mode = TRY_STICKING
+    g, t = qt.cross(w, y[3]), body.torque
+    return as_vector(body.free_acceleration), (t[0] - g[0], t[1] - g[1], t[2] - g[2])
 
 
 @inlined
@@ -81,54 +82,56 @@ def has_sliding_direction(way, i):
 
 
 @inlined
-def is_redundant_contact(i, count, width, small, work):
+def is_redundant_contact(i, count, width, small, scratch):
     """True if contact i without a force may be left to the others of its wall, of which three push at least."""
-    wall, pushing = wall_of(work.slot[i], work), 0
+    contacts = scratch.contacts
+    wall, pushing = wall_of(contacts.slot[i], scratch.scene), 0
     for j in range(count):
-        if wall_of(work.slot[j], work) == wall and work.impulse[width * j] > small * work.mass:
+        if wall_of(contacts.slot[j], scratch.scene) == wall and contacts.impulse[width * j] > small * scratch.body.mass:
             pushing += 1
     return pushing >= MIN_PATCH_CONTACTS
 
 
 @inlined
-def store_solver_forces(count, width, work, contacts):
+def store_solver_forces(count, width, scratch, contacts):
     """Store the solver's forces in `last_force`."""
     clear_last_forces(contacts)
     for i in range(count):
         for c in range(width):
-            contacts.last_force[work.slot[i], c] = work.impulse[width * i + c]
+            contacts.last_force[scratch.contacts.slot[i], c] = scratch.contacts.impulse[width * i + c]
 
 
 @kernel
-def is_body_at_rest(y, w, acceleration, work, thresholds):
+def is_body_at_rest(y, w, acceleration, body, thresholds):
     """True if the body neither moves nor begins to, except for rounding."""
     v = y[2]
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
-    return speed <= 2.0 * thresholds.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * work.acceleration
+    speed = math.sqrt(qt.dot(v, v)) + body.radius * math.sqrt(qt.dot(w, w))
+    return speed <= 2.0 * thresholds.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * body.acceleration
 
 
 @kernel
-def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, work, motion):
+def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, scratch, motion):
     """Set the contact mode and the acting contacts from the solution of `set_up_resting_problem`'s problem."""
+    body = scratch.body
     candidates = motion.candidates
-    R, P, w, _ = free_angular_motion(y, offset_frame, work)
-    alpha = apply_inverse_inertia(P, work.J, moment)
+    R, P, w, _ = free_angular_motion(y, offset_frame, body)
+    alpha = apply_inverse_inertia(P, body.J, moment)
     width = 3
     if friction is None:
         width = 1
-    scale = acceleration_scale(w, work)
+    scale = acceleration_scale(w, body)
     small = _ZERO_SHARE * scale
     if has_sliding:
         small *= _SLIDING_ACCELERATION
     for i in range(count):
-        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates)
+        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates)
         size = math.sqrt(qt.dot(at, at))
-        push = work.impulse[width * i]
-        if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * work.mass * scale:
+        push = scratch.contacts.impulse[width * i]
+        if has_sliding and push > _PAINLEVE_PUSH * _SLIDING_ACCELERATION * body.mass * scale:
             return MODE_INCONSISTENT
         slides = has_sliding and has_sliding_direction(candidates.direction, i)
         kind = CANDIDATE_SLIDING
-        if not push > small * work.mass and (an > small or is_redundant_contact(i, count, width, small, work)):
+        if not push > small * body.mass and (an > small or is_redundant_contact(i, count, width, small, scratch)):
             kind = CANDIDATE_OPEN
         elif friction is not None and not slides and size <= small:
             kind = CANDIDATE_STICKING
@@ -137,13 +140,13 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
             continue
         for c in range(3):
             candidates.direction[i, c] = at[c] / size if size > small else 0.0
-    store_solver_forces(count, width, work, motion.contacts)
+    store_solver_forces(count, width, scratch, motion.contacts)
     activate_candidates(count, motion)
     if has_closing_contact(count, motion):
         return MODE_IMPACT
     if motion.contacts.count == 0:
         return MODE_FLIGHT
-    acceleration = math.sqrt(qt.dot(a, a)) + work.radius * math.sqrt(qt.dot(alpha, alpha))
-    if is_body_at_rest(y, w, acceleration, work, motion.thresholds):
+    acceleration = math.sqrt(qt.dot(a, a)) + body.radius * math.sqrt(qt.dot(alpha, alpha))
+    if is_body_at_rest(y, w, acceleration, body, motion.thresholds):
         return MODE_REST
     return MODE_CONTACT

@@ -21,20 +21,20 @@ _UNSEEN_SPEED = 0.01
 
 
 @inlined
-def _projection_step(holding, P, work, motion):
+def _projection_step(holding, P, scratch, motion):
     """Velocity and turn, both per kinetic metric, that remove `constraint_error` along the rows of the mode."""
-    k = assemble_unknowns(0.0, holding, work, motion)
-    F, T = solve_contact_forces(k, P, work, motion.unknowns)
-    s = 1.0 / work.mass
+    k = assemble_unknowns(0.0, holding, scratch, motion)
+    F, T = solve_contact_forces(k, P, scratch.body, motion.unknowns)
+    s = 1.0 / scratch.body.mass
     return (s * F[0], s * F[1], s * F[2]), T
 
 
 @inlined
-def _set_velocity_errors(contacts, work):
+def _set_velocity_errors(contacts, scene):
     """Write velocities of acting contacts to `constraint_error`; return the largest that the mode forbids [m/s]."""
     worst = 0.0
     for j in range(contacts.count):
-        n = wall_normal(work.walls, wall_of(contacts.slot[j], work))
+        n = wall_normal(scene.walls, wall_of(contacts.slot[j], scene))
         u = row_vector(contacts.velocity, j, 0)
         worst = max(worst, abs(qt.dot(n, u)))
         if contacts.sticks[j]:
@@ -45,50 +45,51 @@ def _set_velocity_errors(contacts, work):
 
 
 @inlined
-def _project_velocities(holding, v, m, P, work, motion):
+def _project_velocities(holding, v, m, P, scratch, motion):
     """Velocity and angular momentum without contact velocities that the mode forbids (placed)."""
-    worst = _set_velocity_errors(motion.contacts, work)
+    worst = _set_velocity_errors(motion.contacts, scratch.scene)
     if not worst > _UNSEEN_SPEED * motion.thresholds.rounding_speed:
         return v, m
-    change, turn = _projection_step(holding, P, work, motion)
+    change, turn = _projection_step(holding, P, scratch, motion)
     return plus(v, change), plus(m, turn)
 
 
 @kernel
-def project_normal_speeds(y, offset_frame, work, motion):
+def project_normal_speeds(y, offset_frame, scratch, motion):
     """State without normal velocities of the acting contacts."""
     x, q, v, m = y
-    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
-    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
-    v, m = _project_velocities(False, v, m, P, work, motion)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, scratch.body)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion)
+    v, m = _project_velocities(False, v, m, P, scratch, motion)
     return x, q, v, m
 
 
 @kernel
-def project_state(y, offset_frame, work, motion):
+def project_state(y, offset_frame, scratch, motion):
     """State without gaps and velocities, above rounding, of contacts in the contact mode.
 
     Least change in the kinetic metric: along M⁻¹ Jᵀ.
     """
+    scene, body = scratch.scene, scratch.body
     contacts = motion.contacts
     if contacts.count == 0:
         return y
     x, q, v, m = y
-    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
-    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, body)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion)
     worst = 0.0
     for j in range(contacts.count):
-        wall = wall_of(contacts.slot[j], work)
-        n = wall_normal(work.walls, wall)
-        gap = qt.dot(n, x) + qt.dot(n, row_vector(contacts.arm, j, 0)) - work.walls[wall, WALL_OFFSET]
+        wall = wall_of(contacts.slot[j], scene)
+        n = wall_normal(scene.walls, wall)
+        gap = qt.dot(n, x) + qt.dot(n, row_vector(contacts.arm, j, 0)) - scene.walls[wall, WALL_OFFSET]
         worst = max(worst, abs(gap))
         for c in range(3):
             contacts.constraint_error[j, c] = gap * n[c]
     if worst > _UNSEEN_GAP * motion.thresholds.touch_gap:
-        move, turn = _projection_step(False, P, work, motion)
+        move, turn = _projection_step(False, P, scratch, motion)
         x = plus(x, move)
-        q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, work.J, turn)), q))
-        R, P, w, alpha = free_angular_motion((x, q, v, m), offset_frame, work)
-        set_contact_kinematics((x, q, v, m), R, w, alpha, offset_frame, work, motion)
-    v, m = _project_velocities(True, v, m, P, work, motion)
+        q = qt.normalise(qt.multiply(qt.exp_map(apply_inverse_inertia(P, body.J, turn)), q))
+        R, P, w, alpha = free_angular_motion((x, q, v, m), offset_frame, body)
+        set_contact_kinematics((x, q, v, m), R, w, alpha, offset_frame, scratch, motion)
+    v, m = _project_velocities(True, v, m, P, scratch, motion)
     return x, q, v, m

@@ -33,11 +33,11 @@ _UNSEEN_APPROACH = 1.0e-2
 
 
 @kernel
-def find_candidates(y, offset_frame, work, motion):
+def find_candidates(y, offset_frame, scratch, motion):
     """Write features that touch and do not leave into `candidate`; return (count, whether one approaches)."""
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
+    compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
     count = motion.candidates.count = 0
     for s in range(smooth.is_active.shape[0]):
         if smooth.gap[ROW_START, s] <= motion.thresholds.touch_gap and count < motion.contacts.slot.shape[0]:
@@ -92,7 +92,7 @@ def has_normal_speed(motion):
 
 
 @kernel
-def project_candidate_speeds(y, offset_frame, work, motion):
+def project_candidate_speeds(y, offset_frame, scratch, motion):
     """State without normal velocities of all candidates that neither approach nor leave, acting or not.
 
     A body may lie on two contacts and rock by less than counts. Setting it down on one contact would otherwise move the
@@ -102,7 +102,7 @@ def project_candidate_speeds(y, offset_frame, work, motion):
     if not has_open_candidate(candidates):
         return y
     put_state_row(smooth, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
+    compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
     if not has_normal_speed(motion):
         return y
     contacts.count = 0
@@ -112,18 +112,19 @@ def project_candidate_speeds(y, offset_frame, work, motion):
         if gap <= thresholds.touch_gap and abs(rate) <= thresholds.rest_speed:
             contacts.slot[contacts.count], contacts.sticks[contacts.count] = s, 0
             contacts.count += 1
-    y = project_normal_speeds(y, offset_frame, work, motion)
+    y = project_normal_speeds(y, offset_frame, scratch, motion)
     activate_candidates(candidates.count, motion)
     return y
 
 
 @inlined
-def contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates):
+def contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates):
     """Acceleration of candidate i: (normal part, tangential part)."""
-    wall = wall_of(candidates.slot[i], work)
-    n = wall_normal(work.walls, wall)
+    scene, body = scratch.scene, scratch.body
+    wall = wall_of(candidates.slot[i], scene)
+    n = wall_normal(scene.walls, wall)
     r, rate = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(candidates.slot[i], work), offset_frame, work
+        body.shape, as_vector(body.dims), R, w, n, feature_of(candidates.slot[i], scene), offset_frame, body
     )
     b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
     bn = qt.dot(n, b)
@@ -131,13 +132,14 @@ def contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates):
 
 
 @kernel
-def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
+def is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion):
     """True if candidate i slides; writes its direction into `candidate_direction`."""
+    scene, body = scratch.scene, scratch.body
     candidates = motion.candidates
-    wall = wall_of(candidates.slot[i], work)
-    n = wall_normal(work.walls, wall)
+    wall = wall_of(candidates.slot[i], scene)
+    n = wall_normal(scene.walls, wall)
     r, _ = contact_arm_and_rate(
-        work.shape, as_vector(work.dims), R, w, n, feature_of(candidates.slot[i], work), offset_frame, work
+        body.shape, as_vector(body.dims), R, w, n, feature_of(candidates.slot[i], scene), offset_frame, body
     )
     u = plus(y[2], qt.cross(w, r))
     un = qt.dot(n, u)
@@ -151,9 +153,9 @@ def is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
 
 
 @inlined
-def acceleration_scale(w, work):
+def acceleration_scale(w, body):
     """Size of the accelerations of a body's contacts [m/s²]."""
-    return work.acceleration + work.radius * qt.dot(w, w)
+    return body.acceleration + body.radius * qt.dot(w, w)
 
 
 @inlined

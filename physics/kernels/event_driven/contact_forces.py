@@ -49,29 +49,30 @@ def apply_inverse_inertia(P, J, h):
 
 
 @kernel
-def free_angular_motion(y, offset_frame, work):
+def free_angular_motion(y, offset_frame, body):
     """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
     q, L = y[1], y[3]
     R = qt.to_matrix(q)
     P = R
     if offset_frame is not None:
-        P = qt.to_matrix(principal_attitude(q, work, offset_frame))
-    J = work.J
+        P = qt.to_matrix(principal_attitude(q, body, offset_frame))
+    J = body.J
     w = apply_inverse_inertia(P, J, L)
     g = qt.cross(w, L)
-    t = work.torque
+    t = body.torque
     return R, P, w, apply_inverse_inertia(P, J, (t[0] - g[0], t[1] - g[1], t[2] - g[2]))
 
 
 @kernel
-def set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion):
+def set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion):
     """Set arms, velocities, sliding directions and free accelerations (`constraint_error`) of the acting contacts."""
+    scene, body = scratch.scene, scratch.body
     contacts = motion.contacts
-    shape, walls = work.shape, work.walls
-    dims, a, v = as_vector(work.dims), as_vector(work.free_acceleration), y[2]
+    shape, walls = body.shape, scene.walls
+    dims, a, v = as_vector(body.dims), as_vector(body.free_acceleration), y[2]
     for j in range(contacts.count):
-        n = wall_normal(walls, wall_of(contacts.slot[j], work))
-        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(contacts.slot[j], work), offset_frame, work)
+        n = wall_normal(walls, wall_of(contacts.slot[j], scene))
+        r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature_of(contacts.slot[j], scene), offset_frame, body)
         u = plus(v, qt.cross(w, r))
         b = plus(plus(a, qt.cross(alpha, r)), qt.cross(w, rate))
         un = qt.dot(n, u)
@@ -97,39 +98,39 @@ def _add_to_unknown(m, r, push, row, share, unknowns):
 
 
 @inlined
-def sliding_force_direction(mu, axes, j, work, contacts):
+def sliding_force_direction(mu, axes, j, body, contacts):
     """Force of the sliding contact j per newton along the normal."""
-    n, d = axes[0], sliding_direction(row_vector(contacts.slip_direction, j, 0), axes, work)
+    n, d = axes[0], sliding_direction(row_vector(contacts.slip_direction, j, 0), axes, body)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
-def _contact_force_direction(mu, axes, j, work, contacts):
+def _contact_force_direction(mu, axes, j, body, contacts):
     """Force of contact j per newton along the normal."""
     if contacts.sticks[j]:
         return axes[0]
-    return sliding_force_direction(mu, axes, j, work, contacts)
+    return sliding_force_direction(mu, axes, j, body, contacts)
 
 
 @inlined
-def _contact_force(normal, first, second, mu, axes, j, work, contacts):
+def _contact_force(normal, first, second, mu, axes, j, body, contacts):
     """Force of contact j with the push `normal` and, if it sticks, these parts along the other two axes."""
-    f = times(normal, _contact_force_direction(mu, axes, j, work, contacts))
+    f = times(normal, _contact_force_direction(mu, axes, j, body, contacts))
     if contacts.sticks[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
     return f
 
 
 @kernel
-def _add_shares(mu, work, motion):
+def _add_shares(mu, scratch, motion):
     """Sum force and moment of all shares into `given_wrench`; without friction they do not matter and are left out."""
     contacts = motion.contacts
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
         for j in range(contacts.count):
-            axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
+            axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
             p = row_vector(contacts.given_force, j, 0)
-            f = _contact_force(p[0], p[1], p[2], mu, axes, j, work, contacts)
+            f = _contact_force(p[0], p[1], p[2], mu, axes, j, scratch.body, contacts)
             force, moment = plus(force, f), plus(moment, qt.cross(row_vector(contacts.arm, j, 0), f))
     for c in range(3):
         motion.unknowns.given_wrench[0, c], motion.unknowns.given_wrench[1, c] = force[c], moment[c]
@@ -159,11 +160,11 @@ def _add_sticking_unknowns(m, j, first_axis, axes, motion):
 
 
 @kernel
-def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
+def _add_patch_unknowns(m, first, last, mu, axes, body, motion):
     """Add three unknowns for the normal forces of the contacts first <= j < last, which share a wall."""
     unknowns, contacts = motion.unknowns, motion.contacts
     _clear_unknowns(m, 3, unknowns)
-    radius = work.radius
+    radius = body.radius
     ca = cb = 0.0
     for j in range(first, last):
         r = row_vector(contacts.arm, j, 0)
@@ -171,7 +172,7 @@ def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
         cb += qt.dot(axes[2], r) / (last - first)
     for j in range(first, last):
         r, b = row_vector(contacts.arm, j, 0), -qt.dot(axes[0], row_vector(contacts.constraint_error, j, 0))
-        push = _contact_force_direction(mu, axes, j, work, contacts)
+        push = _contact_force_direction(mu, axes, j, body, contacts)
         s = (qt.dot(axes[1], r) - ca) / radius
         t = (qt.dot(axes[2], r) - cb) / radius
         contacts.patch[j] = m
@@ -186,27 +187,28 @@ def _add_patch_unknowns(m, first, last, mu, axes, work, motion):
 
 
 @kernel
-def assemble_unknowns(mu, holding, work, motion):
+def assemble_unknowns(mu, holding, scratch, motion):
     """Fill columns, rows, `given_wrench` and right-hand sides from `constraint_error`; return the number of unknowns.
 
     `holding`: contacts that hold do so along the wall, too.
     """
+    scene = scratch.scene
     unknowns, contacts = motion.unknowns, motion.contacts
     m = first = unknowns.is_skew = 0
-    _add_shares(mu, work, motion)
+    _add_shares(mu, scratch, motion)
     for j in range(contacts.count):
         if mu > 0.0 and not contacts.sticks[j]:
             unknowns.is_skew = 1
     while first < contacts.count:
-        wall = wall_of(contacts.slot[first], work)
-        axes = wall_axes(work.walls, wall)
+        wall = wall_of(contacts.slot[first], scene)
+        axes = wall_axes(scene.walls, wall)
         last = first
-        while last < contacts.count and wall_of(contacts.slot[last], work) == wall:
+        while last < contacts.count and wall_of(contacts.slot[last], scene) == wall:
             contacts.patch[last] = NO_PATCH
             last += 1
         own = 0  # the first axis along which a contact that holds has a force of its own
         if last - first >= MIN_PATCH_CONTACTS:
-            m = _add_patch_unknowns(m, first, last, mu, axes, work, motion)
+            m = _add_patch_unknowns(m, first, last, mu, axes, scratch.body, motion)
             own = 1
         for j in range(first, last):
             if holding and contacts.sticks[j]:
@@ -216,7 +218,7 @@ def assemble_unknowns(mu, holding, work, motion):
                 _add_to_unknown(
                     m,
                     row_vector(contacts.arm, j, 0),
-                    sliding_force_direction(mu, axes, j, work, contacts),
+                    sliding_force_direction(mu, axes, j, scratch.body, contacts),
                     axes[0],
                     1.0,
                     unknowns,
@@ -229,11 +231,11 @@ def assemble_unknowns(mu, holding, work, motion):
 
 
 @kernel
-def recover_contact_forces(mu, work, motion):
+def recover_contact_forces(mu, scratch, motion):
     """Force of each acting contact (`force`, `normal`) from the unknowns, with the shares where they count."""
     contacts, unknowns = motion.contacts, motion.unknowns
     for j in range(contacts.count):
-        axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
+        axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
         k, p, f = contacts.first_unknown[j], contacts.patch[j], row_vector(contacts.given_force, j, 0)
         if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
             f = (0.0, 0.0, 0.0)
@@ -250,7 +252,7 @@ def recover_contact_forces(mu, work, motion):
         first = second = 0.0
         if contacts.sticks[j]:
             first, second = f[1] + unknowns.value[k], f[2] + unknowns.value[k + 1]
-        f = _contact_force(contacts.normal[j], first, second, mu, axes, j, work, contacts)
+        f = _contact_force(contacts.normal[j], first, second, mu, axes, j, scratch.body, contacts)
         contacts.force[j, 0], contacts.force[j, 1], contacts.force[j, 2] = f
 
 
@@ -262,10 +264,10 @@ def clear_last_forces(contacts):
 
 
 @kernel
-def store_last_forces(work, contacts):
+def store_last_forces(scene, contacts):
     """Store the forces of the acting contacts in `last_force`, zero for all others."""
     clear_last_forces(contacts)
     for j in range(contacts.count):
-        axes, f = wall_axes(work.walls, wall_of(contacts.slot[j], work)), row_vector(contacts.force, j, 0)
+        axes, f = wall_axes(scene.walls, wall_of(contacts.slot[j], scene)), row_vector(contacts.force, j, 0)
         for c in range(3):
             contacts.last_force[contacts.slot[j], c] = qt.dot(axes[c], f)

@@ -30,32 +30,32 @@ from physics.kernels.event_driven.contact_mode_search import search_contact_mode
 
 
 @kernel
-def find_contact_mode(y, friction, offset_frame, work, motion):
+def find_contact_mode(y, friction, offset_frame, scratch, motion):
     """Find contact mode and acting contacts at y: (contact mode, number of candidates, acceleration, moment).
 
     `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
-    posed in `work`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that
+    posed in `scratch`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that
     problem decides for them, too.
     """
     zero = (0.0, 0.0, 0.0)
     motion.contacts.count = 0
-    count, approaches = find_candidates(y, offset_frame, work, motion)
+    count, approaches = find_candidates(y, offset_frame, scratch, motion)
     for s in range(motion.smooth.is_active.shape[0]):
         motion.smooth.is_active[s] = 0
     if approaches:
         return MODE_IMPACT, 0, zero, zero
     if count == 0:
         return MODE_FLIGHT, 0, zero, zero
-    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
+    R, P, w, alpha = free_angular_motion(y, offset_frame, scratch.body)
     slides = False
     if friction is not None:
         for i in range(count):
-            slides = is_candidate_sliding(i, y, R, w, offset_frame, work, motion) or slides
-    if not slides or not search_contact_modes(count, y, R, P, w, alpha, offset_frame, work, motion):
+            slides = is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion) or slides
+    if not slides or not search_contact_modes(count, y, R, P, w, alpha, offset_frame, scratch, motion):
         if slides:
             for i in range(count):
-                is_candidate_sliding(i, y, R, w, offset_frame, work, motion)
-        a, moment = set_up_resting_problem(count, y, R, w, slides, offset_frame, work, motion.candidates)
+                is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion)
+        a, moment = set_up_resting_problem(count, y, R, w, slides, offset_frame, scratch, motion.candidates)
         return (MODE_UNDECIDED_SLIDING if slides else MODE_UNDECIDED), count, a, moment
     if has_closing_contact(count, motion):
         return MODE_IMPACT, 0, zero, zero

@@ -39,14 +39,15 @@ _SAME_DIRECTION = 1.0e-9
 
 
 @kernel
-def _worst_violation(count, rates, scale, offset_frame, work, motion):
+def _worst_violation(count, rates, scale, offset_frame, scratch, motion):
     """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
 
     `rates` are the attitude, the angular velocity, and both accelerations of the trial.
     """
+    body = scratch.body
     candidates, contacts = motion.candidates, motion.contacts
     R, w, a, alpha = rates
-    weight = _EXACT_ZERO_SHARE * work.mass * scale
+    weight = _EXACT_ZERO_SHARE * body.mass * scale
     k = worst = 0
     which, kind = -1, CANDIDATE_OPEN
     deepest = -weight
@@ -62,13 +63,13 @@ def _worst_violation(count, rates, scale, offset_frame, work, motion):
     for i in range(count):
         if candidates.state[i] != CANDIDATE_OPEN:
             if candidates.state[i] == CANDIDATE_STICKING:
-                excess = cone_excess(k, work, contacts)
+                excess = cone_excess(k, scratch, contacts)
                 if excess > most:
                     most, which, worst, kind = excess, i, k, CANDIDATE_SLIDING
             k += 1
     if which >= 0:
-        axes = wall_axes(work.walls, wall_of(candidates.slot[which], work))
-        n, f = axes[0], unstretch_force(unstretch_force(row_vector(contacts.force, worst, 0), axes, work), axes, work)
+        axes = wall_axes(scratch.scene.walls, wall_of(candidates.slot[which], scratch.scene))
+        n, f = axes[0], unstretch_force(unstretch_force(row_vector(contacts.force, worst, 0), axes, body), axes, body)
         fn = qt.dot(n, f)
         t = (fn * n[0] - f[0], fn * n[1] - f[1], fn * n[2] - f[2])
         size = math.sqrt(qt.dot(t, t))
@@ -78,7 +79,7 @@ def _worst_violation(count, rates, scale, offset_frame, work, motion):
         candidates.is_fresh[which] = 1
         return which, kind
     for i in range(count):
-        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, work, candidates)
+        an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates)
         if candidates.state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
             return i, CANDIDATE_SLIDING if candidates.is_fresh[i] == 0 else CANDIDATE_STICKING
         if candidates.state[i] == CANDIDATE_SLIDING and candidates.is_fresh[i]:
@@ -103,29 +104,30 @@ def has_last_forces(contacts):
 
 
 @kernel
-def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
+def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
     """Do `search_contact_modes` with the last forces unchanged."""
+    body = scratch.body
     candidates = motion.candidates
-    scale = work.acceleration + work.radius * qt.dot(w, w)
+    scale = body.acceleration + body.radius * qt.dot(w, w)
     for i in range(count):
         candidates.is_fresh[i] = candidates.changes[i] = 0
         candidates.state[i] = CANDIDATE_SLIDING
-        if not is_candidate_sliding(i, y, R, w, offset_frame, work, motion):
+        if not is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion):
             candidates.is_fresh[i] = 1
-            if work.mu > 0.0:
+            if body.mu > 0.0:
                 candidates.state[i] = CANDIDATE_STICKING
-    f = as_vector(work.free_acceleration)
+    f = as_vector(body.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):
         activate_candidates(count, motion)
-        set_contact_kinematics(y, R, w, alpha_free, offset_frame, work, motion)
-        m = assemble_unknowns(work.mu, True, work, motion)
-        F, T = solve_contact_forces(m, P, work, motion.unknowns)
-        recover_contact_forces(work.mu, work, motion)
-        turn = apply_inverse_inertia(P, work.J, T)
-        s = 1.0 / work.mass
+        set_contact_kinematics(y, R, w, alpha_free, offset_frame, scratch, motion)
+        m = assemble_unknowns(body.mu, True, scratch, motion)
+        F, T = solve_contact_forces(m, P, body, motion.unknowns)
+        recover_contact_forces(body.mu, scratch, motion)
+        turn = apply_inverse_inertia(P, body.J, T)
+        s = 1.0 / body.mass
         a = (f[0] + s * F[0], f[1] + s * F[1], f[2] + s * F[2])
         alpha = plus(alpha_free, turn)
-        which, kind = _worst_violation(count, (R, w, a, alpha), scale, offset_frame, work, motion)
+        which, kind = _worst_violation(count, (R, w, a, alpha), scale, offset_frame, scratch, motion)
         if which < 0:
             return True
         if kind != candidates.state[which]:
@@ -137,11 +139,11 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
 
 
 @kernel
-def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, work, motion):
+def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
     """Find the kinds of the candidates when some slide, with or without the last forces; return success."""
-    if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion):
+    if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
         return True
     if not has_last_forces(motion.contacts):
         return False
     clear_last_forces(motion.contacts)
-    return search_modes_once(count, y, R, P, w, alpha_free, offset_frame, work, motion)
+    return search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, motion)

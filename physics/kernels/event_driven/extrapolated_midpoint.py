@@ -98,19 +98,20 @@ def put_state_row(smooth, row, state):
 
 
 @kernel
-def compute_state_rate(row, later, offset_frame, work, motion):
+def compute_state_rate(row, later, offset_frame, scratch, motion):
     """Write the rate of change of a row of `y`, `later` [s] than START, into `rate`, and forces into the unknowns."""
+    body = scratch.body
     state = get_state_row(motion.smooth, row)
-    refresh_loads(state, later, offset_frame, work)
+    refresh_loads(state, later, offset_frame, body)
     q, v = state[1], state[2]
-    F, T, w, _, _ = solve_mode_forces(state, offset_frame, work, motion)
-    inv_mass = 1.0 / work.mass
+    F, T, w, _, _ = solve_mode_forces(state, offset_frame, scratch, motion)
+    inv_mass = 1.0 / body.mass
     turn = qt.multiply((0.0, w[0], w[1], w[2]), q)
     rate = motion.smooth.rate
     for c in range(3):
         rate[Y_POSITION + c] = v[c]
-        rate[Y_VELOCITY + c] = work.free_acceleration[c] + inv_mass * F[c]
-        rate[Y_ANGULAR_MOMENTUM + c] = work.torque[c] + T[c]
+        rate[Y_VELOCITY + c] = body.free_acceleration[c] + inv_mass * F[c]
+        rate[Y_ANGULAR_MOMENTUM + c] = body.torque[c] + T[c]
     rate[Y_QUATERNION], rate[Y_QUATERNION + 1], rate[Y_QUATERNION + 2], rate[Y_QUATERNION + 3] = (
         0.5 * turn[0],
         0.5 * turn[1],
@@ -120,21 +121,21 @@ def compute_state_rate(row, later, offset_frame, work, motion):
 
 
 @kernel
-def set_error_scale(h, work, smooth):
+def set_error_scale(h, body, smooth):
     """Set the scales of the errors of a step whose start `prepare_extrapolated_step` has prepared."""
     x, _, v, _ = get_state_row(smooth, ROW_START)
-    speed = math.sqrt(qt.dot(v, v)) + work.radius * smooth.start_angular_speed + work.acceleration * h
-    place_size = work.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
+    speed = math.sqrt(qt.dot(v, v)) + body.radius * smooth.start_angular_speed + body.acceleration * h
+    place_size = body.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
     for c in range(3):
         smooth.scale[Y_POSITION + c] = place_size
         smooth.scale[Y_VELOCITY + c] = speed
-        smooth.scale[Y_ANGULAR_MOMENTUM + c] = speed * work.mass * work.radius
+        smooth.scale[Y_ANGULAR_MOMENTUM + c] = speed * body.mass * body.radius
     for c in range(4):
         smooth.scale[Y_QUATERNION + c] = 1.0
 
 
 @kernel
-def _midpoint_rule(parts, h, offset_frame, work, motion):
+def _midpoint_rule(parts, h, offset_frame, scratch, motion):
     """Do one midpoint rule with `parts` parts from START, smoothed, into row END."""
     y, rate = motion.smooth.y, motion.smooth.rate
     s = h / parts
@@ -142,28 +143,28 @@ def _midpoint_rule(parts, h, offset_frame, work, motion):
         y[ROW_PREVIOUS, c] = y[ROW_START, c]
         y[ROW_CURRENT, c] = y[ROW_START, c] + s * motion.smooth.first_rate[c]
     for k in range(1, parts):
-        compute_state_rate(ROW_CURRENT, k * s, offset_frame, work, motion)
+        compute_state_rate(ROW_CURRENT, k * s, offset_frame, scratch, motion)
         for c in range(Y_SIZE):
             old = y[ROW_PREVIOUS, c]
             y[ROW_PREVIOUS, c] = y[ROW_CURRENT, c]
             y[ROW_CURRENT, c] = old + 2.0 * s * rate[c]
-    compute_state_rate(ROW_CURRENT, h, offset_frame, work, motion)
+    compute_state_rate(ROW_CURRENT, h, offset_frame, scratch, motion)
     for c in range(Y_SIZE):
         y[ROW_END, c] = 0.5 * (y[ROW_CURRENT, c] + y[ROW_PREVIOUS, c] + s * rate[c])
 
 
 @kernel
-def try_extrapolated_step(h, offset_frame, work, motion):
+def try_extrapolated_step(h, offset_frame, scratch, motion):
     """Compute row END from row START, h later (`first_rate` known): (relative error, rules used)."""
     smooth = motion.smooth
     table, y = smooth.extrapolation_table, smooth.y
-    goal = work.tolerance
+    goal = scratch.settings.tolerance
     aim = max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if motion.contacts.count > 0 else goal
-    set_error_scale(h, work, smooth)
+    set_error_scale(h, scratch.body, smooth)
     error = math.inf
     used = MAX_MIDPOINT_RULES
     for k in range(MAX_MIDPOINT_RULES):
-        _midpoint_rule(2 * (k + 1), h, offset_frame, work, motion)
+        _midpoint_rule(2 * (k + 1), h, offset_frame, scratch, motion)
         before = error
         error = total = 0.0
         for c in range(Y_SIZE):
@@ -194,7 +195,7 @@ def try_extrapolated_step(h, offset_frame, work, motion):
 
 
 @kernel
-def prepare_extrapolated_step(left, offset_frame, work, motion):
+def prepare_extrapolated_step(left, offset_frame, scratch, motion):
     """Prepare row START for `try_extrapolated_step`; return the longest useful step.
 
     The step is limited by the time `left`, by the length that the last step's errors suggest, by a turn of
@@ -202,72 +203,75 @@ def prepare_extrapolated_step(left, offset_frame, work, motion):
     field it is also limited by the time in which the body moves by its radius, so that no wall is reached and left
     again unseen.
     """
+    body = scratch.body
     contacts = motion.contacts
     state = get_state_row(motion.smooth, ROW_START)
-    R, P, w, alpha = free_angular_motion(state, offset_frame, work)
+    R, P, w, alpha = free_angular_motion(state, offset_frame, body)
     for j in range(contacts.count):
         for c in range(3):
             contacts.start_slip_direction[j, c] = contacts.slip_direction[j, c]
-    set_contact_kinematics(state, R, w, alpha, offset_frame, work, motion)
+    set_contact_kinematics(state, R, w, alpha, offset_frame, scratch, motion)
     for j in range(contacts.count):
-        t, speed = sliding_velocity(j, work, contacts)
+        t, speed = sliding_velocity(j, scratch.scene, contacts)
         contacts.is_starting[j] = 1 if speed <= motion.thresholds.slip_stop_speed else 0
         if speed > motion.thresholds.slip_stop_speed:
             for c in range(3):
                 contacts.start_slip_direction[j, c] = t[c] / speed
     contacts.slip_turn_rate = contacts.friction_turn_stiffness = 0.0
-    _set_first_rate(offset_frame, work, motion)
+    _set_first_rate(offset_frame, scratch, motion)
     turn = motion.smooth.start_angular_speed = math.sqrt(qt.dot(w, w))
-    if has_one_sliding_contact(work, contacts):
-        _begin_slide(P, offset_frame, work, motion)
-    motion.smooth.weight = work.mass * (work.acceleration + work.radius * turn * turn)
+    if has_one_sliding_contact(body, contacts):
+        _begin_slide(P, offset_frame, scratch, motion)
+    motion.smooth.weight = body.mass * (body.acceleration + body.radius * turn * turn)
     h = min(left, motion.pace.step_length)
-    if work.shape != SPHERE and h * turn > _MAX_STEP_ROTATION:
+    if body.shape != SPHERE and h * turn > _MAX_STEP_ROTATION:
         h = _MAX_STEP_ROTATION / turn
-    if contacts.count == 0 and has_fields(work):
-        h = min(h, work.radius / (math.sqrt(qt.dot(state[2], state[2])) + math.sqrt(work.radius * work.acceleration)))
-    return _limit_to_slip_stop(h, P, work, motion)
+    if contacts.count == 0 and has_fields(body):
+        h = min(h, body.radius / (math.sqrt(qt.dot(state[2], state[2])) + math.sqrt(body.radius * body.acceleration)))
+    return _limit_to_slip_stop(h, P, scratch, motion)
 
 
 @inlined
-def _set_first_rate(offset_frame, work, motion):
+def _set_first_rate(offset_frame, scratch, motion):
     """Set `first_rate`, the rate at START."""
-    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
+    compute_state_rate(ROW_START, 0.0, offset_frame, scratch, motion)
     for c in range(Y_SIZE):
         motion.smooth.first_rate[c] = motion.smooth.rate[c]
 
 
 @kernel
-def _begin_slide(P, offset_frame, work, motion):
+def _begin_slide(P, offset_frame, scratch, motion):
     """Prepare the only contact, which slides, at START; a creeping one gets the direction of `slip_onset`."""
     contacts = motion.contacts
-    contacts.friction_turn_stiffness = friction_turn_stiffness(P, work, motion)
-    _, contacts.start_slip_speed = sliding_velocity(0, work, contacts)
+    contacts.friction_turn_stiffness = friction_turn_stiffness(P, scratch, motion)
+    _, contacts.start_slip_speed = sliding_velocity(0, scratch.scene, contacts)
     contacts.slip_growth = qt.dot(
-        contact_velocity_rate(0, P, work, motion), row_vector(contacts.start_slip_direction, 0, 0)
+        contact_velocity_rate(0, P, scratch.body, motion), row_vector(contacts.start_slip_direction, 0, 0)
     )
-    if contacts.slip_growth >= 0.0 and is_creeping(contacts.slip_growth, contacts.start_slip_speed, work, motion):
+    if contacts.slip_growth >= 0.0 and is_creeping(
+        contacts.slip_growth, contacts.start_slip_speed, scratch.body, motion
+    ):
         contacts.is_starting[0] = 1
-        _set_first_rate(offset_frame, work, motion)
+        _set_first_rate(offset_frame, scratch, motion)
     if contacts.is_starting[0]:
-        _set_slip_turn_rate(offset_frame, work, motion)
-        _set_first_rate(offset_frame, work, motion)
+        _set_slip_turn_rate(offset_frame, scratch, motion)
+        _set_first_rate(offset_frame, scratch, motion)
 
 
 @inlined
-def _set_slip_turn_rate(offset_frame, work, motion):
+def _set_slip_turn_rate(offset_frame, scratch, motion):
     """Set `slip_turn_rate` of the only contact, from a state a moment ahead."""
     contacts, pace, smooth = motion.contacts, motion.pace, motion.smooth
     d = row_vector(contacts.slip_direction, 0, 0)
     for c in range(Y_SIZE):
         smooth.y[ROW_CURRENT, c] = smooth.y[ROW_START, c] + pace.min_look_ahead * smooth.first_rate[c]
-    compute_state_rate(ROW_CURRENT, pace.min_look_ahead, offset_frame, work, motion)
-    n = wall_normal(work.walls, wall_of(contacts.slot[0], work))
+    compute_state_rate(ROW_CURRENT, pace.min_look_ahead, offset_frame, scratch, motion)
+    n = wall_normal(scratch.scene.walls, wall_of(contacts.slot[0], scratch.scene))
     contacts.slip_turn_rate = qt.dot(qt.cross(n, d), row_vector(contacts.slip_direction, 0, 0)) / pace.min_look_ahead
 
 
 @inlined
-def _limit_to_slip_stop(h, P, work, motion):
+def _limit_to_slip_stop(h, P, scratch, motion):
     """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
 
     The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
@@ -275,11 +279,11 @@ def _limit_to_slip_stop(h, P, work, motion):
     """
     contacts = motion.contacts
     for j in range(contacts.count):
-        if contacts.sticks[j] or contacts.is_starting[j] or not work.mu > 0.0:
+        if contacts.sticks[j] or contacts.is_starting[j] or not scratch.body.mu > 0.0:
             continue
         d = row_vector(contacts.start_slip_direction, j, 0)
-        _, speed = sliding_velocity(j, work, contacts)
-        change = contact_velocity_rate(j, P, work, motion)
+        _, speed = sliding_velocity(j, scratch.scene, contacts)
+        change = contact_velocity_rate(j, P, scratch.body, motion)
         along, size = qt.dot(d, change), math.sqrt(qt.dot(change, change))
         bend = size - abs(along)
         if along < 0.0 and -along * h > speed:

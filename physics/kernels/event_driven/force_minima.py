@@ -32,24 +32,24 @@ _CONSTANT_FORCE_RULES = 2
 
 
 @kernel
-def store_force_margins(row, work, motion):
+def store_force_margins(row, scratch, motion):
     """Write the margins of push and cone of the acting contacts, from the unknowns, to a row of `margin` [weights]."""
     contacts = motion.contacts
-    recover_contact_forces(work.mu, work, motion)
+    recover_contact_forces(scratch.body.mu, scratch, motion)
     for j in range(contacts.count):
         contacts.margin[row, 0, j] = contacts.normal[j] / motion.smooth.weight
         contacts.margin[row, 1, j] = math.inf
         if contacts.sticks[j]:
-            contacts.margin[row, 1, j] = -cone_excess(j, work, contacts) / motion.smooth.weight
+            contacts.margin[row, 1, j] = -cone_excess(j, scratch, contacts) / motion.smooth.weight
 
 
 @inlined
-def _probe_margins(row, t, moment, offset_frame, work, motion):
+def _probe_margins(row, t, moment, offset_frame, scratch, motion):
     """Write the margins `moment` after a row of `y` at the time t, with the rate of change `rate`, into INSIDE."""
     for c in range(Y_SIZE):
         motion.smooth.y[ROW_CURRENT, c] = motion.smooth.y[row, c] + moment * motion.smooth.rate[c]
-    compute_state_rate(ROW_CURRENT, t + moment, offset_frame, work, motion)
-    store_force_margins(_INSIDE_ROW, work, motion)
+    compute_state_rate(ROW_CURRENT, t + moment, offset_frame, scratch, motion)
+    store_force_margins(_INSIDE_ROW, scratch, motion)
 
 
 @inlined
@@ -62,7 +62,7 @@ def _cubic_interior_minimum(low, fall, high, rise, h):
 
 
 @kernel
-def find_force_minimum(h, used, offset_frame, work, motion):
+def find_force_minimum(h, used, offset_frame, scratch, motion):
     """Earliest time within the step of h to END at which a margin of force may be used up; h without one.
 
     START of `margin` holds the data of the start of the step; forces, rates and unknowns are those of END.
@@ -72,10 +72,10 @@ def find_force_minimum(h, used, offset_frame, work, motion):
         return h
     moment = _PROBE_SHARE * h
     falls = False
-    store_force_margins(ROW_END, work, motion)
+    store_force_margins(ROW_END, scratch, motion)
     for c in range(Y_SIZE):
         smooth.last_rate[c], smooth.rate[c] = smooth.rate[c], smooth.first_rate[c]
-    _probe_margins(ROW_START, 0.0, moment, offset_frame, work, motion)
+    _probe_margins(ROW_START, 0.0, moment, offset_frame, scratch, motion)
     for sort in range(2):
         for j in range(contacts.count):
             contacts.margin_rate[sort, j] = (
@@ -86,7 +86,7 @@ def find_force_minimum(h, used, offset_frame, work, motion):
     if falls:
         for c in range(Y_SIZE):
             smooth.rate[c] = smooth.last_rate[c]
-        _probe_margins(ROW_END, h, -moment, offset_frame, work, motion)
+        _probe_margins(ROW_END, h, -moment, offset_frame, scratch, motion)
         for sort in range(2):
             for j in range(contacts.count):
                 low, high, fall = (
@@ -104,6 +104,6 @@ def find_force_minimum(h, used, offset_frame, work, motion):
                     first = min(first, t)
     if not 0.0 < first < h:
         first = h
-        compute_state_rate(ROW_END, h, offset_frame, work, motion)
-        recover_contact_forces(work.mu, work, motion)
+        compute_state_rate(ROW_END, h, offset_frame, scratch, motion)
+        recover_contact_forces(scratch.body.mu, scratch, motion)
     return first

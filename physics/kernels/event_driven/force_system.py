@@ -19,9 +19,9 @@ _DOUBTFUL_PIVOT = 1.0e-7
 
 
 @kernel
-def _set_metric(m, P, work, unknowns):
+def _set_metric(m, P, body, unknowns):
     """Fill `matrix` with the products of the rows in their metric, and the right-hand side with 0."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
+    inv_mass, J, A = 1.0 / body.mass, body.J, unknowns.matrix
     for k in range(m):
         F, g = row_vector(unknowns.row, k, 0), apply_inverse_inertia(P, J, row_vector(unknowns.row_moment, k, 0))
         for l in range(m):
@@ -32,20 +32,20 @@ def _set_metric(m, P, work, unknowns):
 
 
 @kernel
-def _choose_rows(m, P, work, unknowns):
+def _choose_rows(m, P, body, unknowns):
     """Mark rows that are no sums of others in `independent_row`, by their own metric; return their number.
 
     The largest entry of a positive semidefinite matrix is on the diagonal, so columns of pivots are rows, too.
     """
-    _set_metric(m, P, work, unknowns)
+    _set_metric(m, P, body, unknowns)
     rank, _ = solve_full_pivot(m, unknowns.matrix, unknowns.independent_row, unknowns.value)
     return rank
 
 
 @kernel
-def _set_rows(rows, m, P, work, unknowns):
+def _set_rows(rows, m, P, body, unknowns):
     """Fill `matrix` with the `rows` chosen equations of the m unknowns."""
-    inv_mass, J, A = 1.0 / work.mass, work.J, unknowns.matrix
+    inv_mass, J, A = 1.0 / body.mass, body.J, unknowns.matrix
     F, g = row_vector(unknowns.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(unknowns.given_wrench, 1, 0))
     for i in range(rows):
         l = unknowns.independent_row[i]
@@ -65,7 +65,7 @@ def _set_rows(rows, m, P, work, unknowns):
 
 
 @kernel
-def solve_contact_forces(m, P, work, unknowns):
+def solve_contact_forces(m, P, body, unknowns):
     """Solve for the m unknowns that change the shares least; return total force and moment of the contacts.
 
     Rows of two contacts may be dependent. If each contact pushes along its row, the matrix shows it: a row whose
@@ -75,11 +75,11 @@ def solve_contact_forces(m, P, work, unknowns):
     """
     for k in range(m):
         unknowns.independent_row[k] = k
-    _set_rows(m, m, P, work, unknowns)
+    _set_rows(m, m, P, body, unknowns)
     rank, least = solve_full_pivot(m, unknowns.matrix, unknowns.order, unknowns.value)
     if rank < m or (unknowns.is_skew and least < _DOUBTFUL_PIVOT):
-        rows = _choose_rows(m, P, work, unknowns)
-        _set_rows(rows, m, P, work, unknowns)
+        rows = _choose_rows(m, P, body, unknowns)
+        _set_rows(rows, m, P, body, unknowns)
         if rows < m:
             solve_least_norm(rows, m, unknowns.matrix, unknowns.value)
         else:
@@ -93,14 +93,15 @@ def solve_contact_forces(m, P, work, unknowns):
 
 
 @kernel
-def solve_mode_forces(y, offset_frame, work, motion):
+def solve_mode_forces(y, offset_frame, scratch, motion):
     """Forces of the contact mode at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
-    R, P, w, alpha = free_angular_motion(y, offset_frame, work)
+    body = scratch.body
+    R, P, w, alpha = free_angular_motion(y, offset_frame, body)
     zero = (0.0, 0.0, 0.0)
     if motion.contacts.count == 0:
         return zero, zero, w, alpha, P
-    set_contact_kinematics(y, R, w, alpha, offset_frame, work, motion)
-    set_slip_onset_direction(P, work, motion.contacts)
-    m = assemble_unknowns(work.mu, True, work, motion)
-    force, moment = solve_contact_forces(m, P, work, motion.unknowns)
+    set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion)
+    set_slip_onset_direction(P, scratch, motion.contacts)
+    m = assemble_unknowns(body.mu, True, scratch, motion)
+    force, moment = solve_contact_forces(m, P, body, motion.unknowns)
     return force, moment, w, alpha, P

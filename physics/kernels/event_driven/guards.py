@@ -45,16 +45,17 @@ FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 
 @kernel
-def compute_feature_gaps(row, offset_frame, work, smooth):
+def compute_feature_gaps(row, offset_frame, scratch, smooth):
     """Write gaps and rates of all features into column `row` of `gap`, infinite for a wall out of reach."""
+    scene, body = scratch.scene, scratch.body
     x, q, v, m = get_state_row(smooth, row)
-    R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, work)
-    dims, features, shape = as_vector(work.dims), work.features, work.shape
-    center = geometric_center(x, R, work, offset_frame)
-    for k in range(work.walls.shape[0]):
-        n = wall_normal(work.walls, k)
-        d = qt.dot(n, center) - work.walls[k, WALL_OFFSET]
-        if d > 2.0 * work.radius:
+    R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, body)
+    dims, features, shape = as_vector(body.dims), scene.features, body.shape
+    center = geometric_center(x, R, body, offset_frame)
+    for k in range(scene.walls.shape[0]):
+        n = wall_normal(scene.walls, k)
+        d = qt.dot(n, center) - scene.walls[k, WALL_OFFSET]
+        if d > 2.0 * body.radius:
             for feature in range(features):
                 smooth.gap[row, k * features + feature] = math.inf
             continue
@@ -62,7 +63,7 @@ def compute_feature_gaps(row, offset_frame, work, smooth):
         vn, turn = qt.dot(n, v), qt.cross(n, w)
         if shape == BLOCK:
             if offset_frame is not None:
-                vn += qt.dot(turn, center_arm(R, work))
+                vn += qt.dot(turn, center_arm(R, body))
             b = qt.transposed_matvec(R, turn)
             f = (dims[0] * b[0], dims[1] * b[1], dims[2] * b[2])
             for vertex in range(VERTEX_COUNT):
@@ -114,26 +115,27 @@ def least_gap_margin(h, motion):
 
 
 @inlined
-def _cone_excess(j, mu, work, contacts):
+def _cone_excess(j, mu, scratch, contacts):
     """Tangential force of contact j less μ times its push [N]."""
-    axes = wall_axes(work.walls, wall_of(contacts.slot[j], work))
-    n, f = axes[0], unstretch_force(row_vector(contacts.force, j, 0), axes, work)
+    axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
+    n, f = axes[0], unstretch_force(row_vector(contacts.force, j, 0), axes, scratch.body)
     p = contacts.normal[j]
     return math.sqrt(max(0.0, qt.dot(f, f) - qt.dot(n, f) * qt.dot(n, f))) - mu * p
 
 
 @inlined
-def _pair_excess(i, j, mu, work, contacts):
+def _pair_excess(i, j, mu, scratch, contacts):
     """Excess over the joint cone of two contacts on one wall, however they share the force along their line [N]."""
-    axes = wall_axes(work.walls, wall_of(contacts.slot[i], work))
+    body = scratch.body
+    axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene))
     a, b = row_vector(contacts.arm, i, 0), row_vector(contacts.arm, j, 0)
-    e = unstretch_force((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, work)
+    e = unstretch_force((b[0] - a[0], b[1] - a[1], b[2] - a[2]), axes, body)
     s = 1.0 / math.sqrt(qt.dot(e, e))
     e = (s * e[0], s * e[1], s * e[2])
     across = qt.cross(axes[0], e)
     f, g = (
-        unstretch_force(row_vector(contacts.force, i, 0), axes, work),
-        unstretch_force(row_vector(contacts.force, j, 0), axes, work),
+        unstretch_force(row_vector(contacts.force, i, 0), axes, body),
+        unstretch_force(row_vector(contacts.force, j, 0), axes, body),
     )
     p, q = mu * contacts.normal[i], mu * contacts.normal[j]
     fa, ga = abs(qt.dot(across, f)), abs(qt.dot(across, g))
@@ -145,58 +147,59 @@ def _pair_excess(i, j, mu, work, contacts):
 
 
 @kernel
-def cone_excess(j, work, contacts):
+def cone_excess(j, scratch, contacts):
     """Excess [N] of the sticking contact j over its friction cone, together with its wall's other sticking contacts."""
-    wall, other, holding = wall_of(contacts.slot[j], work), j, 1
+    wall, other, holding = wall_of(contacts.slot[j], scratch.scene), j, 1
     for k in range(contacts.count):
-        if k != j and contacts.sticks[k] and wall_of(contacts.slot[k], work) == wall:
+        if k != j and contacts.sticks[k] and wall_of(contacts.slot[k], scratch.scene) == wall:
             other = k
             holding += 1
     if holding == 2 and contacts.normal[j] >= 0.0 and contacts.normal[other] >= 0.0:
-        return _pair_excess(j, other, work.mu, work, contacts)
-    return _cone_excess(j, work.mu, work, contacts)
+        return _pair_excess(j, other, scratch.body.mu, scratch, contacts)
+    return _cone_excess(j, scratch.body.mu, scratch, contacts)
 
 
 @inlined
-def least_inactive_pull(work, motion):
+def least_inactive_pull(scratch, motion):
     """Least pull [N] of a sliding face's affine force at a touching vertex that does not act."""
+    scene = scratch.scene
     contacts = motion.contacts
     least, which = math.inf, -1
     for j in range(contacts.count):
         if contacts.patch[j] == NO_PATCH or (
-            j > 0 and wall_of(contacts.slot[j], work) == wall_of(contacts.slot[j - 1], work)
+            j > 0 and wall_of(contacts.slot[j], scene) == wall_of(contacts.slot[j - 1], scene)
         ):
             continue
-        wall, k = wall_of(contacts.slot[j], work), contacts.patch[j]
-        axes = wall_axes(work.walls, wall)
+        wall, k = wall_of(contacts.slot[j], scene), contacts.patch[j]
+        axes = wall_axes(scene.walls, wall)
         r = row_vector(contacts.arm, j, 0)
-        for s in range(wall * work.features, (wall + 1) * work.features):
+        for s in range(wall * scene.features, (wall + 1) * scene.features):
             if motion.smooth.is_active[s] or not motion.smooth.gap[ROW_START, s] <= motion.thresholds.touch_gap:
                 continue
             # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
-            p = row_vector(contacts.arm, opposite_face_contact(s, wall, work, contacts), 0)
+            p = row_vector(contacts.arm, opposite_face_contact(s, wall, scene, contacts), 0)
             a = b = 0.0
             for i in range(contacts.count):
-                if wall_of(contacts.slot[i], work) == wall:
+                if wall_of(contacts.slot[i], scene) == wall:
                     a += qt.dot(axes[1], row_vector(contacts.arm, i, 0))
                     b += qt.dot(axes[2], row_vector(contacts.arm, i, 0))
             a -= 2.0 * qt.dot(axes[1], p) + qt.dot(axes[1], r)
             b -= 2.0 * qt.dot(axes[2], p) + qt.dot(axes[2], r)
             pull = -motion.unknowns.value[k]
-            pull -= (contacts.patch_coordinate[j, 0] + a / work.radius) * motion.unknowns.value[k + 1]
-            pull -= (contacts.patch_coordinate[j, 1] + b / work.radius) * motion.unknowns.value[k + 2]
+            pull -= (contacts.patch_coordinate[j, 0] + a / scratch.body.radius) * motion.unknowns.value[k + 1]
+            pull -= (contacts.patch_coordinate[j, 1] + b / scratch.body.radius) * motion.unknowns.value[k + 2]
             if pull < least:
                 least, which = pull, s
     return least, which
 
 
 @inlined
-def opposite_face_contact(slot, wall, work, contacts):
+def opposite_face_contact(slot, wall, scene, contacts):
     """Contact of a face of three opposite to the vertex `slot`, in all bits but the face's."""
     best, most = -1, -1
     for i in range(contacts.count):
-        if wall_of(contacts.slot[i], work) == wall:
-            bits = feature_of(contacts.slot[i], work) ^ feature_of(slot, work)
+        if wall_of(contacts.slot[i], scene) == wall:
+            bits = feature_of(contacts.slot[i], scene) ^ feature_of(slot, scene)
             differing = (bits & 1) + ((bits >> 1) & 1) + ((bits >> 2) & 1)
             if differing > most:
                 best, most = i, differing
@@ -204,7 +207,7 @@ def opposite_face_contact(slot, wall, work, contacts):
 
 
 @kernel
-def least_force_margin(slack, work, motion):
+def least_force_margin(slack, scratch, motion):
     """Smallest margin of the force guards, of which `slack` counts as none: (margin, guard, contact or slot)."""
     contacts, smooth = motion.contacts, motion.smooth
     margin, guard, which = math.inf, GUARD_NONE, -1
@@ -213,44 +216,45 @@ def least_force_margin(slack, work, motion):
         if push < margin:
             margin, guard, which = push, GUARD_PUSH, j
         if contacts.sticks[j]:
-            cone = slack - cone_excess(j, work, contacts) / smooth.weight
+            cone = slack - cone_excess(j, scratch, contacts) / smooth.weight
             if cone < margin:
                 margin, guard, which = cone, GUARD_CONE, j
-    pull, slot = least_inactive_pull(work, motion)
+    pull, slot = least_inactive_pull(scratch, motion)
     if pull / smooth.weight + slack < margin:
         margin, guard, which = pull / smooth.weight + slack, GUARD_LOAD, slot
     return margin, guard, which
 
 
 @kernel
-def least_start_force_margin(offset_frame, work, motion):
+def least_start_force_margin(offset_frame, scratch, motion):
     """Smallest margin of force at START, above rounding."""
-    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
-    recover_contact_forces(work.mu, work, motion)
-    return least_force_margin(0.0, work, motion)[0]
+    compute_state_rate(ROW_START, 0.0, offset_frame, scratch, motion)
+    recover_contact_forces(scratch.body.mu, scratch, motion)
+    return least_force_margin(0.0, scratch, motion)[0]
 
 
 @kernel
-def least_guard_margin(h, heeds, slack, offset_frame, work, motion):
+def least_guard_margin(h, heeds, slack, offset_frame, scratch, motion):
     """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
 
     `heeds`: True if the force guards count; they end a step when they are below zero by more than `slack`.
     """
+    body = scratch.body
     smooth, contacts, thresholds = motion.smooth, motion.contacts, motion.thresholds
-    compute_state_rate(ROW_END, h, offset_frame, work, motion)
-    recover_contact_forces(work.mu, work, motion)
-    compute_feature_gaps(ROW_END, offset_frame, work, smooth)
+    compute_state_rate(ROW_END, h, offset_frame, scratch, motion)
+    recover_contact_forces(body.mu, scratch, motion)
+    compute_feature_gaps(ROW_END, offset_frame, scratch, smooth)
     gap, which = least_gap_margin(h, motion)
-    margin, guard = gap / work.radius, GUARD_GAP
+    margin, guard = gap / body.radius, GUARD_GAP
     if heeds and smooth.weight > 0.0:
-        least, sort, j = least_force_margin(slack, work, motion)
+        least, sort, j = least_force_margin(slack, scratch, motion)
         if least < margin:
             margin, guard, which = least, sort, j
-    if work.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
+    if body.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
         scale = smooth.scale[Y_VELOCITY]
         for j in range(contacts.count):
             if not contacts.sticks[j]:
-                t, _ = sliding_velocity(j, work, contacts)
+                t, _ = sliding_velocity(j, scratch.scene, contacts)
                 speed = qt.dot(t, row_vector(contacts.start_slip_direction, j, 0))
                 still = thresholds.slip_stop_speed
                 speed = (speed + 0.5 * still if contacts.is_starting[j] else speed - still) / scale

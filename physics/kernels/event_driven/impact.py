@@ -38,7 +38,7 @@ _ALL_AT_ONCE = -1
 
 
 @inlined
-def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
+def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
     """Target velocity of a contact that approaches with `speed`; stores the time of bounces that are too short.
 
     A leaving contact may be reversed, to approach at e times its speed and collide next. If it were only stopped, its
@@ -49,16 +49,16 @@ def rebound_target(speed, normal, r, rate, w, alpha, work, motion):
     """
     thresholds, pace = motion.thresholds, motion.pace
     if speed < -thresholds.rest_speed:
-        return work.restitution * speed
+        return body.restitution * speed
     if not speed > thresholds.rest_speed:
         return 0.0
-    goal = work.restitution * speed
+    goal = body.restitution * speed
     if goal > thresholds.rest_speed:
         return goal
-    a, c, g = as_vector(work.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
+    a, c, g = as_vector(body.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
     b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
-    if b > 0.0 and work.restitution < 1.0:
-        pace.skipped_bounce_time = max(pace.skipped_bounce_time, 2.0 * goal / (b * (1.0 - work.restitution)))
+    if b > 0.0 and body.restitution < 1.0:
+        pace.skipped_bounce_time = max(pace.skipped_bounce_time, 2.0 * goal / (b * (1.0 - body.restitution)))
     return 0.0
 
 
@@ -71,7 +71,7 @@ def takes_part_in_impact(s, motion):
 
 
 @inlined
-def next_sequential_impact(work, motion, report):
+def next_sequential_impact(body, motion, report):
     """Feature that collides alone because it approaches fastest; _ALL_AT_ONCE where all collide at once.
 
     All collide at once also after `_MAX_SEQUENTIAL_IMPACTS` at one moment; the report counts this as a problem not
@@ -81,7 +81,7 @@ def next_sequential_impact(work, motion, report):
         return _ALL_AT_ONCE
     motion.pace.sequential_impacts += 1
     if motion.pace.sequential_impacts > _MAX_SEQUENTIAL_IMPACTS:
-        report[work.world, at.UNCONVERGED] += 1.0
+        report[body.world, at.UNCONVERGED] += 1.0
         return _ALL_AT_ONCE
     fastest, found = 0.0, _ALL_AT_ONCE
     for s in range(motion.smooth.is_active.shape[0]):
@@ -91,28 +91,33 @@ def next_sequential_impact(work, motion, report):
 
 
 @kernel
-def set_up_impact_problem(y, offset_frame, work, motion, report):
+def set_up_impact_problem(y, offset_frame, scratch, motion, report):
     """Write the contact problem of all touching contacts, or of the next in turn; return their number."""
+    scene, body = scratch.scene, scratch.body
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
-    R, _, w, alpha = free_angular_motion(y, offset_frame, work)
+    compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
+    R, _, w, alpha = free_angular_motion(y, offset_frame, body)
     n = 0
     motion.pace.skipped_bounce_time = 0.0
-    only = next_sequential_impact(work, motion, report)
+    only = next_sequential_impact(body, motion, report)
     for s in range(smooth.is_active.shape[0]):
         rate = smooth.gap_rate[ROW_START, s]
-        if not takes_part_in_impact(s, motion) or n >= work.slot.shape[0] or (only != _ALL_AT_ONCE and s != only):
+        if (
+            not takes_part_in_impact(s, motion)
+            or n >= scratch.contacts.slot.shape[0]
+            or (only != _ALL_AT_ONCE and s != only)
+        ):
             continue
-        normal = wall_normal(work.walls, wall_of(s, work))
+        normal = wall_normal(scene.walls, wall_of(s, scene))
         r, r_rate = contact_arm_and_rate(
-            work.shape, as_vector(work.dims), R, w, normal, feature_of(s, work), offset_frame, work
+            body.shape, as_vector(body.dims), R, w, normal, feature_of(s, scene), offset_frame, body
         )
-        goal = rebound_target(-rate, normal, r, r_rate, w, alpha, work, motion)
-        set_up_contact(n, s, r, (goal, 0.0, 0.0), work)
+        goal = rebound_target(-rate, normal, r, r_rate, w, alpha, body, motion)
+        set_up_contact(n, s, r, (goal, 0.0, 0.0), scratch.contacts)
         n += 1
-        report[work.world, at.PENETRATION] = max(report[work.world, at.PENETRATION], -smooth.gap[ROW_START, s])
-    work.mode = TRY_SLIDING
+        report[body.world, at.PENETRATION] = max(report[body.world, at.PENETRATION], -smooth.gap[ROW_START, s])
+    scratch.stage.mode = TRY_SLIDING
     return n
 
 
@@ -121,36 +126,38 @@ def _no_tangential_target(*arguments):
 
 
 @if_law((LAW_TANGENTIAL,), _no_tangential_target)
-def set_tangential_rebound(n, y, offset_frame, motion, work):
+def set_tangential_rebound(n, y, offset_frame, motion, scratch):
     """Set targets along the wall of the single bouncing contact, as `tangential_restitution.set_tangential_targets`.
 
     A contact with a restitution but without a rebound is a bounce left out; it has no rebound along the wall either.
     """
     bouncing, found = 0, 0
     for i in range(n):
-        speed = -motion.smooth.gap_rate[ROW_START, work.slot[i]]
-        if speed > motion.thresholds.rest_speed and (work.target[i, 0] > 0.0 or not work.restitution > 0.0):
+        speed = -motion.smooth.gap_rate[ROW_START, scratch.contacts.slot[i]]
+        if speed > motion.thresholds.rest_speed and (
+            scratch.contacts.target[i, 0] > 0.0 or not scratch.body.restitution > 0.0
+        ):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        set_tangential_target(found, y, offset_frame, work)
+        set_tangential_target(found, y, offset_frame, scratch)
 
 
 @inlined
-def report_impact_solve(solved, report, work):
+def report_impact_solve(solved, report, scratch):
     """Add a contact problem, solved to rounding, to the world's report."""
-    report_solve(report, work.world, *solved[2:], max(work.tolerance, _ROUNDING_RESIDUAL))
+    report_solve(report, scratch.body.world, *solved[2:], max(scratch.settings.tolerance, _ROUNDING_RESIDUAL))
 
 
 @inlined
-def _solve_plastic_impact(n, contact, v, L, solved, P, work, report):
+def _solve_plastic_impact(n, contact, v, L, solved, P, scratch, report):
     """Solve the same collision without any rebound; the cost of `solved` goes into the report."""
-    report_impact_solve(solved, report, work)
-    set_plastic_targets(n, work)
-    return solve_contacts(n, contact, v, L, P, work)
+    report_impact_solve(solved, report, scratch)
+    set_plastic_targets(n, scratch.contacts)
+    return solve_contacts(n, contact, v, L, P, scratch)
 
 
 @kernel
-def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
+def fall_back_to_plastic(n, contact, v, L, solved, P, scratch, report):
     """Result of `solve_contacts` for a collision; of an impact without rebound if that is no solution.
 
     With friction two contacts may hold any stress along the line between them, and no impulse moves one of them along
@@ -158,51 +165,53 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, work, report):
     """
     is_asked = False
     for i in range(n):
-        is_asked = is_asked or work.target[i, 0] > 0.0
+        is_asked = is_asked or scratch.contacts.target[i, 0] > 0.0
     if solved[2] <= _FAILED_RESIDUAL or not is_asked:
         return solved
-    return _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
+    return _solve_plastic_impact(n, contact, v, L, solved, P, scratch, report)
 
 
 @kernel
-def cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, contacts, report):
+def cap_rebound_energy(n, y, contact, offset_frame, solved, P, scratch, contacts, report):
     """Result of `solve_contacts` for a collision with friction, its rebound limited to the available energy.
 
-    The impulses in `work` are those of the result. See `physics.kernels.contact_law.restitution_energy`.
+    The impulses in `scratch` are those of the result. See `physics.kernels.contact_law.restitution_energy`.
     """
+    body = scratch.body
     _, q, v, L = y
     v_full, L_full = solved[0], solved[1]
-    before, full = kinetic_energy(q, v, L, work, offset_frame), kinetic_energy(q, v_full, L_full, work, offset_frame)
+    before, full = kinetic_energy(q, v, L, body, offset_frame), kinetic_energy(q, v_full, L_full, body, offset_frame)
     if not full > (1.0 + IMPACT_ENERGY_ROUNDING) * before:
         return solved
     for k in range(3 * n):
-        contacts.rebound[k] = work.impulse[k]
-    plastic = _solve_plastic_impact(n, contact, v, L, solved, P, work, report)
+        contacts.rebound[k] = scratch.contacts.impulse[k]
+    plastic = _solve_plastic_impact(n, contact, v, L, solved, P, scratch, report)
     v_plastic, L_plastic, residual, sweeps, method = plastic
-    v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), work, offset_frame)
+    v, L, s = limit_rebound_energy(q, before, (v_plastic, L_plastic), (v_full, L_full), body, offset_frame)
     for k in range(3 * n):
-        work.impulse[k] += s * (contacts.rebound[k] - work.impulse[k])
+        scratch.contacts.impulse[k] += s * (contacts.rebound[k] - scratch.contacts.impulse[k])
     return v, L, residual, sweeps, method
 
 
 @kernel
-def set_up_jump_problem(y, h, offset_frame, work, motion):
-    """Write the contact problem of a first-order step over h into `work`: (contacts, velocity, angular momentum)."""
+def set_up_jump_problem(y, h, offset_frame, scratch, motion):
+    """Write the contact problem of a first-order step over h into `scratch`: (contacts, velocity, angular momentum)."""
+    scene, body = scratch.scene, scratch.body
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
-    R, _, w, _ = free_angular_motion(y, offset_frame, work)
+    compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
+    R, _, w, _ = free_angular_motion(y, offset_frame, body)
     count = 0
     for s in range(smooth.is_active.shape[0]):
         gap, rate = smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s]
-        if not gap <= motion.thresholds.touch_gap - min(0.0, rate) * h or count >= work.slot.shape[0]:
+        if not gap <= motion.thresholds.touch_gap - min(0.0, rate) * h or count >= scratch.contacts.slot.shape[0]:
             continue
-        n = wall_normal(work.walls, wall_of(s, work))
-        r, _ = contact_arm_and_rate(work.shape, as_vector(work.dims), R, w, n, feature_of(s, work), offset_frame, work)
-        set_up_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), work)
+        n = wall_normal(scene.walls, wall_of(s, scene))
+        r, _ = contact_arm_and_rate(body.shape, as_vector(body.dims), R, w, n, feature_of(s, scene), offset_frame, body)
+        set_up_contact(count, s, r, (-max(gap, 0.0) / h, 0.0, 0.0), scratch.contacts)
         count += 1
-    work.mode = TRY_SLIDING
-    a, torque, v, L = work.free_acceleration, work.torque, y[2], y[3]
+    scratch.stage.mode = TRY_SLIDING
+    a, torque, v, L = body.free_acceleration, body.torque, y[2], y[3]
     return (
         count,
         (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2]),
@@ -211,34 +220,37 @@ def set_up_jump_problem(y, h, offset_frame, work, motion):
 
 
 @inlined
-def principal_rotation(y, offset_frame, work):
+def principal_rotation(y, offset_frame, body):
     """Rotation matrix of the principal axes at y."""
-    return qt.to_matrix(principal_attitude(y[1], work, offset_frame))
+    return qt.to_matrix(principal_attitude(y[1], body, offset_frame))
 
 
 @kernel
-def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
+def resolve_impacts(y, t, contact, offset_frame, scratch, motion, records):
     """State after the impulses of a collision at the time t, of all touching contacts or of the next in turn."""
-    refresh_loads(y, 0.0, offset_frame, work)
-    n = set_up_impact_problem(y, offset_frame, work, motion, records.report)
-    set_tangential_rebound(n, y, offset_frame, motion, work)
+    body = scratch.body
+    refresh_loads(y, 0.0, offset_frame, body)
+    n = set_up_impact_problem(y, offset_frame, scratch, motion, records.report)
+    set_tangential_rebound(n, y, offset_frame, motion, scratch)
     x, q, v, L = y
     if n > 0:
-        P = principal_rotation(y, offset_frame, work)
-        solved = solve_contacts(n, contact, v, L, P, work)
-        solved = fall_back_to_plastic(n, contact, v, L, solved, P, work, records.report)
-        solved = reject_energy_gain(n, contact, v, L, solved, P, work)
-        if has_friction(contact) and work.restitution > 0.0:
-            solved = cap_rebound_energy(n, y, contact, offset_frame, solved, P, work, motion.contacts, records.report)
-        report_impact_solve(solved, records.report, work)
+        P = principal_rotation(y, offset_frame, body)
+        solved = solve_contacts(n, contact, v, L, P, scratch)
+        solved = fall_back_to_plastic(n, contact, v, L, solved, P, scratch, records.report)
+        solved = reject_energy_gain(n, contact, v, L, solved, P, scratch)
+        if has_friction(contact) and body.restitution > 0.0:
+            solved = cap_rebound_energy(
+                n, y, contact, offset_frame, solved, P, scratch, motion.contacts, records.report
+            )
+        report_impact_solve(solved, records.report, scratch)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
         n,
         rows_per_contact(contact),
         x,
-        work.mass * motion.thresholds.rounding_speed,
+        body.mass * motion.thresholds.rounding_speed,
         t,
-        work,
+        scratch,
         records.log,
         records.counts,
     )
@@ -246,22 +258,23 @@ def resolve_impacts(y, t, contact, offset_frame, work, motion, records):
 
 
 @kernel
-def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records):
+def resolve_inconsistency(y, h, t, contact, offset_frame, scratch, motion, records):
     """State with the velocities of a first-order step over h from the time t, before a leap."""
-    refresh_loads(y, 0.0, offset_frame, work)
-    n, v, L = set_up_jump_problem(y, h, offset_frame, work, motion)
+    body = scratch.body
+    refresh_loads(y, 0.0, offset_frame, body)
+    n, v, L = set_up_jump_problem(y, h, offset_frame, scratch, motion)
     if n > 0:  # there may be nothing in reach
-        P = principal_rotation(y, offset_frame, work)
-        solved = solve_contacts(n, contact, v, L, P, work)
-        report_impact_solve(solved, records.report, work)
+        P = principal_rotation(y, offset_frame, body)
+        solved = solve_contacts(n, contact, v, L, P, scratch)
+        report_impact_solve(solved, records.report, scratch)
         v, L = solved[0], solved[1]
     ev.log_wall_impacts(
         n,
         rows_per_contact(contact),
         y[0],
-        work.mass * motion.thresholds.rounding_speed,
+        body.mass * motion.thresholds.rounding_speed,
         t,
-        work,
+        scratch,
         records.log,
         records.counts,
     )
@@ -269,9 +282,9 @@ def resolve_inconsistency(y, h, t, contact, offset_frame, work, motion, records)
 
 
 @kernel
-def drift_at_velocity(y, h, offset_frame, work):
+def drift_at_velocity(y, h, offset_frame, body):
     """State after a moment h at constant velocities."""
     x, q, v, L = y
-    w = angular_velocity(q, L, work, offset_frame)
+    w = angular_velocity(q, L, body, offset_frame)
     x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])
     return x, qt.normalise(qt.multiply(qt.exp_map((h * w[0], h * w[1], h * w[2])), q)), v, L

@@ -55,7 +55,7 @@ def distrust_force_guards(nearest, motion):
 
 
 @kernel
-def has_acceleration_jumped(what, y, offset_frame, work, motion):
+def has_acceleration_jumped(what, y, offset_frame, scratch, motion):
     """True if the step that led to y went too far: the acceleration there does not continue the earlier one."""
     smooth, pace = motion.smooth, motion.pace
     if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
@@ -64,17 +64,17 @@ def has_acceleration_jumped(what, y, offset_frame, work, motion):
         return True
     put_state_row(smooth, ROW_START, y)
     pace.step_length = pace.look_ahead
-    prepare_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
+    prepare_extrapolated_step(pace.look_ahead, offset_frame, scratch, motion)
     for c in range(Y_VELOCITY, Y_SIZE):
-        unit = smooth.weight / work.mass if c < Y_ANGULAR_MOMENTUM else smooth.weight * work.radius
+        unit = smooth.weight / scratch.body.mass if c < Y_ANGULAR_MOMENTUM else smooth.weight * scratch.body.radius
         if abs(smooth.first_rate[c] - pace.end_rate[c]) > _SAME_ACCELERATION * unit:
             return True
     return False
 
 
 @kernel
-def accept_step(what, watched, y, offset_frame, work, motion):
+def accept_step(what, watched, y, offset_frame, scratch, motion):
     """Judge the contact mode at y; GOES_BACK if the step that led there was too long and must be repeated."""
-    if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, work, motion):
+    if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, scratch, motion):
         return MODE_ROLLBACK
     return what

@@ -12,12 +12,13 @@ WALL_SEPARATED, WALL_SLIPPING, WALL_STICKING = range(3)
 
 
 @kernel
-def log_mode_changes(work, motion, log, counts, t):
+def log_mode_changes(scratch, motion, log, counts, t):
     """Log events of the walls at which the contact changes."""
-    for wall in range(work.walls.shape[0]):
+    body = scratch.body
+    for wall in range(scratch.scene.walls.shape[0]):
         state = WALL_SEPARATED
         for j in range(motion.contacts.count):
-            if wall_of(motion.contacts.slot[j], work) == wall:
+            if wall_of(motion.contacts.slot[j], scratch.scene) == wall:
                 if motion.contacts.sticks[j]:
                     state = WALL_STICKING
                 elif state == WALL_SEPARATED:
@@ -27,18 +28,18 @@ def log_mode_changes(work, motion, log, counts, t):
             continue
         motion.smooth.wall_state[wall] = state
         if old == WALL_SEPARATED:
-            ev.note_mode_change(log, counts, work.i, t + motion.pace.skipped_bounce_time, ev.KIND_TOUCH, wall)
+            ev.note_mode_change(log, counts, body.i, t + motion.pace.skipped_bounce_time, ev.KIND_TOUCH, wall)
         elif state == WALL_SEPARATED:
-            ev.note_mode_change(log, counts, work.i, t, ev.KIND_RELEASE, wall)
+            ev.note_mode_change(log, counts, body.i, t, ev.KIND_RELEASE, wall)
         else:
-            ev.note_mode_change(log, counts, work.i, t, ev.KIND_STICK if state == WALL_STICKING else ev.KIND_SLIP, wall)
+            ev.note_mode_change(log, counts, body.i, t, ev.KIND_STICK if state == WALL_STICKING else ev.KIND_SLIP, wall)
 
 
 @kernel
-def store_contact_modes(memory, i, work, motion):
+def store_contact_modes(memory, i, scratch, motion):
     """Store the contact mode and the contact forces for later (`time_stepping.warm_start.store_warm_start`)."""
     contacts = motion.contacts
-    slots = work.slot.shape[0]
+    slots = scratch.contacts.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
     for k in range(int(memory[i, 1])):
         for c in range(3):
@@ -50,21 +51,21 @@ def store_contact_modes(memory, i, work, motion):
         for c in range(3):
             memory[i, row + 3 * slot + c] = contacts.last_force[slot, c]
     total = 0.0
-    for wall in range(work.walls.shape[0] - 1, -1, -1):
+    for wall in range(scratch.scene.walls.shape[0] - 1, -1, -1):
         total = 3.0 * total + motion.smooth.wall_state[wall]
     memory[i, 2] = 2.0 * total + motion.smooth.is_resting
 
 
 @inlined
-def load_contact_modes(memory, i, work, motion):
+def load_contact_modes(memory, i, scratch, motion):
     """Read the contact mode at the end of the last step, and its forces: the opposite of `store_contact_modes`."""
-    row = WALL_MEMORY_HEAD + work.slot.shape[0]
+    row = WALL_MEMORY_HEAD + scratch.contacts.slot.shape[0]
     for s in range(motion.contacts.last_force.shape[0]):
         for c in range(3):
             motion.contacts.last_force[s, c] = memory[i, row + 3 * s + c]
     total = int(memory[i, 2])  # whether it rested, and base 3 a digit per wall
     motion.smooth.is_resting = total % 2
     total //= 2
-    for wall in range(work.walls.shape[0]):
+    for wall in range(scratch.scene.walls.shape[0]):
         motion.smooth.wall_state[wall] = total % 3
         total //= 3

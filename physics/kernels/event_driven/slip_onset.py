@@ -38,9 +38,9 @@ _CREEP_OVERSHOOT = 2.0
 
 
 @inlined
-def sliding_velocity(j, work, contacts):
+def sliding_velocity(j, scene, contacts):
     """Tangential velocity of contact j and its size."""
-    n = wall_normal(work.walls, wall_of(contacts.slot[j], work))
+    n = wall_normal(scene.walls, wall_of(contacts.slot[j], scene))
     u = row_vector(contacts.velocity, j, 0)
     un = qt.dot(n, u)
     t = (u[0] - un * n[0], u[1] - un * n[1], u[2] - un * n[2])
@@ -48,9 +48,9 @@ def sliding_velocity(j, work, contacts):
 
 
 @inlined
-def contact_velocity_rate(j, P, work, motion):
+def contact_velocity_rate(j, P, body, motion):
     """Rate at which the velocity of contact j changes at START, from `first_rate` and `constraint_error` there."""
-    rate, a, torque = motion.smooth.first_rate, work.free_acceleration, work.torque
+    rate, a, torque = motion.smooth.first_rate, body.free_acceleration, body.torque
     T = (
         rate[Y_ANGULAR_MOMENTUM] - torque[0],
         rate[Y_ANGULAR_MOMENTUM + 1] - torque[1],
@@ -60,90 +60,92 @@ def contact_velocity_rate(j, P, work, motion):
     return plus(
         plus(
             row_vector(motion.contacts.constraint_error, j, 0),
-            qt.cross(apply_inverse_inertia(P, work.J, T), row_vector(motion.contacts.arm, j, 0)),
+            qt.cross(apply_inverse_inertia(P, body.J, T), row_vector(motion.contacts.arm, j, 0)),
         ),
         F,
     )
 
 
 @inlined
-def friction_turn_stiffness(P, work, motion):
+def friction_turn_stiffness(P, scratch, motion):
     """Turning stiffness K of the only contact, from `first_rate` [m/s²]."""
-    n = wall_normal(work.walls, wall_of(motion.contacts.slot[0], work))
+    body = scratch.body
+    n = wall_normal(scratch.scene.walls, wall_of(motion.contacts.slot[0], scratch.scene))
     across = qt.cross(n, row_vector(motion.contacts.start_slip_direction, 0, 0))
     moment = qt.cross(row_vector(motion.contacts.arm, 0, 0), across)
-    a, rate = work.free_acceleration, motion.smooth.first_rate
-    push = work.mass * (
+    a, rate = body.free_acceleration, motion.smooth.first_rate
+    push = body.mass * (
         n[0] * (rate[Y_VELOCITY] - a[0]) + n[1] * (rate[Y_VELOCITY + 1] - a[1]) + n[2] * (rate[Y_VELOCITY + 2] - a[2])
     )
-    return work.mu * push * (1.0 / work.mass + qt.dot(moment, apply_inverse_inertia(P, work.J, moment)))
+    return body.mu * push * (1.0 / body.mass + qt.dot(moment, apply_inverse_inertia(P, body.J, moment)))
 
 
 @inlined
-def has_one_sliding_contact(work, contacts):
+def has_one_sliding_contact(body, contacts):
     """True if one contact acts, and it slides with friction."""
-    return contacts.count == 1 and contacts.sticks[0] == 0 and work.mu > 0.0
+    return contacts.count == 1 and contacts.sticks[0] == 0 and body.mu > 0.0
 
 
 @inlined
-def _is_small(share, speed, work, motion):
+def _is_small(share, speed, body, motion):
     """True if the speed of a slip is below `share` times SLOWLY."""
     return (
-        speed * (motion.smooth.start_angular_speed + math.sqrt(work.acceleration / work.radius))
+        speed * (motion.smooth.start_angular_speed + math.sqrt(body.acceleration / body.radius))
         < share * _CREEP_SPEED * motion.contacts.friction_turn_stiffness
     )
 
 
 @inlined
-def is_creeping(growth, speed, work, motion):
+def is_creeping(growth, speed, body, motion):
     """True if a slip that grows at the rate `growth` is so slow, and grows so slowly, that only loads turn it."""
-    return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, work, motion)
+    return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, body, motion)
 
 
 @inlined
-def has_outrun_creep(h, work, motion):
+def has_outrun_creep(h, scratch, motion):
     """True if the only contact begins to slide, and goes beyond creeping in the step of h to END, placed."""
     contacts = motion.contacts
-    if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
+    if not has_one_sliding_contact(scratch.body, contacts) or not contacts.is_starting[0]:
         return False
-    _, speed = sliding_velocity(0, work, contacts)
+    _, speed = sliding_velocity(0, scratch.scene, contacts)
     if not speed > _CREEP_OVERSHOOT * motion.thresholds.slip_stop_speed:
         return False
-    if not _is_small(_CREEP_OVERSHOOT * _CREEP_OVERSHOOT, speed, work, motion):
+    if not _is_small(_CREEP_OVERSHOOT * _CREEP_OVERSHOOT, speed, scratch.body, motion):
         return True
     limit = _CREEP_GROWTH * contacts.friction_turn_stiffness
     return contacts.slip_growth < limit and speed - contacts.start_slip_speed > _CREEP_OVERSHOOT * limit * h
 
 
 @inlined
-def _slip_accelerations(angle, first, second, axes, P, work, contacts):
+def _slip_accelerations(angle, first, second, axes, P, body, contacts):
     """Accelerations of contact 0 (across, along) its sliding direction, `angle` from `first` to `second`."""
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
         contacts.slip_direction[0, k] = d[k]
     n, r, b = axes[0], row_vector(contacts.arm, 0, 0), row_vector(contacts.constraint_error, 0, 0)
-    f = sliding_force_direction(work.mu, axes, 0, work, contacts)
-    a = plus(times(1.0 / work.mass, f), qt.cross(apply_inverse_inertia(P, work.J, qt.cross(r, f)), r))
+    f = sliding_force_direction(body.mu, axes, 0, body, contacts)
+    a = plus(times(1.0 / body.mass, f), qt.cross(apply_inverse_inertia(P, body.J, qt.cross(r, f)), r))
     a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
     return c * qt.dot(second, a) - s * qt.dot(first, a), qt.dot(d, a)
 
 
 @kernel
-def set_slip_onset_direction(P, work, contacts):
+def set_slip_onset_direction(P, scratch, contacts):
     """Set `slip_direction` of the only acting contact to the direction of the module, and place it.
 
     Several contacts begin to slide in the directions with which they were found.
     """
-    if not has_one_sliding_contact(work, contacts) or not contacts.is_starting[0]:
+    body = scratch.body
+    if not has_one_sliding_contact(body, contacts) or not contacts.is_starting[0]:
         return
-    axes = wall_axes(work.walls, wall_of(contacts.slot[0], work))
+    axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[0], scratch.scene))
     n, u, first = axes[0], row_vector(contacts.velocity, 0, 0), row_vector(contacts.start_slip_direction, 0, 0)
     second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
     angle = 0.0
     for _ in range(_ANGLE_NEWTON_STEPS):
-        across, along = _slip_accelerations(angle, first, second, axes, P, work, contacts)
-        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, work, contacts)
+        across, along = _slip_accelerations(angle, first, second, axes, P, body, contacts)
+        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, body, contacts)
         stiffness = (across - nudged) / _ANGLE_DIFFERENCE
         if not stiffness > 0.0:
             angle = 0.0
@@ -155,4 +157,4 @@ def set_slip_onset_direction(P, work, contacts):
         angle += step
         if abs(step) <= _ANGLE_TOLERANCE:
             break
-    _slip_accelerations(angle, first, second, axes, P, work, contacts)
+    _slip_accelerations(angle, first, second, axes, P, body, contacts)

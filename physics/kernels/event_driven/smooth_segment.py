@@ -54,15 +54,15 @@ _REST_SPEED_SHARE = 1.0e-6
 
 
 @inlined
-def newton_time_to_gap(t, margin, guard, which, work, smooth):
+def newton_time_to_gap(t, margin, guard, which, body, smooth):
     """Newton's step to the time at which the gap that was missed at END, t after START, closes; -1 without one."""
     if guard != GUARD_GAP or not smooth.gap_rate[ROW_END, which] < 0.0:
         return -1.0
-    return t - margin * work.radius / smooth.gap_rate[ROW_END, which]
+    return t - margin * body.radius / smooth.gap_rate[ROW_END, which]
 
 
 @kernel
-def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
+def locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion):
     """Move the end of the step (END) to the zero of its smallest margin: (its length, guard, contact or slot).
 
     The zero of a gap is found by Newton's steps, other zeros by false position with the Illinois rule. A bisection
@@ -74,25 +74,25 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     slack = FORCE_MARGIN_TOLERANCE
     if guard in FORCE_GUARDS:
-        least = least_start_force_margin(offset_frame, work, motion)
+        least = least_start_force_margin(offset_frame, scratch, motion)
         if least > FORCE_MARGIN_TOLERANCE:
             slack, low_margin, high_margin = 0.0, least, margin - FORCE_MARGIN_TOLERANCE
     side, width, stale = 0, h, 0
-    newton = newton_time_to_gap(h, margin, guard, which, work, motion.smooth)
+    newton = newton_time_to_gap(h, margin, guard, which, scratch.body, motion.smooth)
     for _ in range(_MAX_LOCATION_TRIALS):
         t = newton
         if not low < t < high:
             t = low + (high - low) * low_margin / (low_margin - high_margin)
             if stale >= _BISECT_AFTER or not low < t < high:
                 t = 0.5 * (low + high)
-        error, _ = try_extrapolated_step(t, offset_frame, work, motion)
-        if not error <= work.tolerance:
+        error, _ = try_extrapolated_step(t, offset_frame, scratch, motion)
+        if not error <= scratch.settings.tolerance:
             return t, GUARD_STEP_FAILED, which
-        margin, g, w = least_guard_margin(t, heeds, slack, offset_frame, work, motion)
+        margin, g, w = least_guard_margin(t, heeds, slack, offset_frame, scratch, motion)
         newton = -1.0
         if margin < 0.0:
             high, high_margin, guard, which = t, margin, g, w
-            newton = newton_time_to_gap(t, margin, g, w, work, motion.smooth)
+            newton = newton_time_to_gap(t, margin, g, w, scratch.body, motion.smooth)
             if side == 1:
                 low_margin *= 0.5
             side = 1
@@ -111,30 +111,31 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, work, motion):
         ):
             break
     if margin >= 0.0:
-        try_extrapolated_step(high, offset_frame, work, motion)
-        _, guard, which = least_guard_margin(high, heeds, slack, offset_frame, work, motion)
+        try_extrapolated_step(high, offset_frame, scratch, motion)
+        _, guard, which = least_guard_margin(high, heeds, slack, offset_frame, scratch, motion)
     return high, guard, which
 
 
 @inlined
-def has_slip_stopped(guard, which, work, motion):
+def has_slip_stopped(guard, which, scene, motion):
     """True if the contact that ended a step nearly stands still there, so that the sliding ends there, not before."""
     if guard != GUARD_SPEED:
         return False
-    return sliding_velocity(which, work, motion.contacts)[1] <= motion.thresholds.slip_stop_speed
+    return sliding_velocity(which, scene, motion.contacts)[1] <= motion.thresholds.slip_stop_speed
 
 
 @kernel
-def slide_to_stop(which, left, heeds, offset_frame, work, motion):
+def slide_to_stop(which, left, heeds, offset_frame, scratch, motion):
     """Let contact `which`, which slides slower than the limit at END, slide until it stands still: the time [s].
 
     The direction stays the same. Returns 0 if another event would come within it, or if the contact has only
     begun to slide.
     """
+    body = scratch.body
     contacts, smooth, thresholds = motion.contacts, motion.smooth, motion.thresholds
     if contacts.is_starting[which]:
         return 0.0
-    slip, speed = sliding_velocity(which, work, contacts)
+    slip, speed = sliding_velocity(which, scratch.scene, contacts)
     if not thresholds.rounding_speed < speed <= 2.0 * thresholds.slip_stop_speed:
         return 0.0
     before = get_state_row(smooth, ROW_START)
@@ -142,77 +143,78 @@ def slide_to_stop(which, left, heeds, offset_frame, work, motion):
     for c in range(3):
         contacts.start_slip_direction[which, c] = slip[c] / speed
     put_state_row(smooth, ROW_START, end)
-    compute_state_rate(ROW_START, 0.0, offset_frame, work, motion)
+    compute_state_rate(ROW_START, 0.0, offset_frame, scratch, motion)
     for c in range(Y_SIZE):
         smooth.first_rate[c] = smooth.rate[c]
-    _, P, _, _ = free_angular_motion(end, offset_frame, work)
-    along = qt.dot(contact_velocity_rate(which, P, work, motion), row_vector(contacts.start_slip_direction, which, 0))
+    _, P, _, _ = free_angular_motion(end, offset_frame, body)
+    along = qt.dot(contact_velocity_rate(which, P, body, motion), row_vector(contacts.start_slip_direction, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
-        error, _ = try_extrapolated_step(h, offset_frame, work, motion)
-        margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion)
-        if error <= work.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
-            advance_clock(h, work)
+        error, _ = try_extrapolated_step(h, offset_frame, scratch, motion)
+        margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion)
+        if error <= scratch.settings.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
+            advance_clock(h, body)
             return h
     put_state_row(smooth, ROW_START, before)
     put_state_row(smooth, ROW_END, end)
     least_guard_margin(
-        0.0, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion
+        0.0, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion
     )  # forces and gaps are those of END again
     return 0.0
 
 
 @inlined
-def body_speed_bound(y, offset_frame, work):
+def body_speed_bound(y, offset_frame, body):
     """Bound of the speed of any point of the body [m/s]."""
-    v, w = y[2], angular_velocity(y[1], y[3], work, offset_frame)
-    return math.sqrt(qt.dot(v, v)) + work.radius * math.sqrt(qt.dot(w, w))
+    v, w = y[2], angular_velocity(y[1], y[3], body, offset_frame)
+    return math.sqrt(qt.dot(v, v)) + body.radius * math.sqrt(qt.dot(w, w))
 
 
 @inlined
-def _begin_next_step(left, offset_frame, work, motion):
+def _begin_next_step(left, offset_frame, scratch, motion):
     """Length of the next step, from the end of the last one."""
     smooth = motion.smooth
     for s in range(smooth.is_active.shape[0]):
         gap, rate = smooth.gap[ROW_END, s], smooth.gap_rate[ROW_END, s]
         smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s] = gap, rate
-    h = prepare_extrapolated_step(left, offset_frame, work, motion)
-    store_force_margins(ROW_START, work, motion)
+    h = prepare_extrapolated_step(left, offset_frame, scratch, motion)
+    store_force_margins(ROW_START, scratch, motion)
     return h
 
 
 @kernel
-def integrate_segment(y, left, offset_frame, work, motion):
+def integrate_segment(y, left, offset_frame, scratch, motion):
     """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
 
     Where the force guards do not count, one step is taken, at most `watched_length` long: its guard is WATCH at least.
     """
+    body = scratch.body
     smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds
     heeds = has_trusted_guards(motion)
-    had, still = body_speed_bound(y, offset_frame, work), thresholds.rest_speed
-    y = project_state(project_candidate_speeds(y, offset_frame, work, motion), offset_frame, work, motion)
-    if had > still and body_speed_bound(y, offset_frame, work) <= _REST_SPEED_SHARE * still:
+    had, still = body_speed_bound(y, offset_frame, body), thresholds.rest_speed
+    y = project_state(project_candidate_speeds(y, offset_frame, scratch, motion), offset_frame, scratch, motion)
+    if had > still and body_speed_bound(y, offset_frame, body) <= _REST_SPEED_SHARE * still:
         return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
     put_state_row(smooth, ROW_START, y)
-    compute_feature_gaps(ROW_START, offset_frame, work, smooth)
+    compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
     pace.step_length = left if heeds else pace.watched_length
-    t, h = 0.0, prepare_extrapolated_step(left, offset_frame, work, motion)
-    store_force_margins(ROW_START, work, motion)
+    t, h = 0.0, prepare_extrapolated_step(left, offset_frame, scratch, motion)
+    store_force_margins(ROW_START, scratch, motion)
     for _ in range(_MAX_SEGMENT_STEPS):
-        error, used = try_extrapolated_step(h, offset_frame, work, motion)
+        error, used = try_extrapolated_step(h, offset_frame, scratch, motion)
         is_over, guard = False, GUARD_STEP_FAILED
-        if error <= work.tolerance:
-            margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, work, motion)
+        if error <= scratch.settings.tolerance:
+            margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion)
             is_over = margin < 0.0
-            if has_outrun_creep(h, work, motion):
+            if has_outrun_creep(h, scratch, motion):
                 guard = GUARD_STEP_FAILED
-            elif is_over and not has_slip_stopped(guard, which, work, motion):
-                h, guard, which = locate_event(h, margin, guard, which, heeds, offset_frame, work, motion)
+            elif is_over and not has_slip_stopped(guard, which, scratch.scene, motion):
+                h, guard, which = locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion)
         if guard != GUARD_STEP_FAILED and heeds:
-            dip = find_force_minimum(h, used, offset_frame, work, motion)
+            dip = find_force_minimum(h, used, offset_frame, scratch, motion)
             if dip < h:
                 h = dip
-                refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, work)
+                refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
                 continue
         if guard == GUARD_STEP_FAILED:
             if not h > SEGMENT_SHORTEST_STEP * left:
@@ -220,15 +222,15 @@ def integrate_segment(y, left, offset_frame, work, motion):
             # Not `prepare_extrapolated_step` again: it would go by the directions (`slip_direction`) that the trial
             # ended with. The scale of the errors is that of the start.
             h *= SEGMENT_STEP_CUT
-            refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, work)
+            refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
             continue
         t += h
-        advance_clock(h, work)
+        advance_clock(h, body)
         if is_over and guard == GUARD_SPEED:
-            t += slide_to_stop(which, left - t, heeds, offset_frame, work, motion)
+            t += slide_to_stop(which, left - t, heeds, offset_frame, scratch, motion)
         pace.step_length = SEGMENT_STEP_GROWTH * h if used <= SEGMENT_EASY_RULES else h
-        store_last_forces(work, motion.contacts)
-        y = project_state(get_state_row(smooth, ROW_END), offset_frame, work, motion)
+        store_last_forces(scratch.scene, motion.contacts)
+        y = project_state(get_state_row(smooth, ROW_END), offset_frame, scratch, motion)
         if is_over:
             return y, t, guard
         if not heeds:
@@ -238,18 +240,18 @@ def integrate_segment(y, left, offset_frame, work, motion):
         put_state_row(smooth, ROW_START, y)
         if not t < left:
             break
-        h = _begin_next_step(left - t, offset_frame, work, motion)
+        h = _begin_next_step(left - t, offset_frame, scratch, motion)
     if t < left:
         return get_state_row(smooth, ROW_START), t, GUARD_STEP_FAILED
     return y, left, GUARD_NONE
 
 
 @kernel
-def predict_state(y, offset_frame, work, motion):
+def predict_state(y, offset_frame, scratch, motion):
     """Predicted state of the contact mode after a moment."""
     pace = motion.pace
     put_state_row(motion.smooth, ROW_START, y)
     pace.step_length = pace.look_ahead
-    prepare_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
-    try_extrapolated_step(pace.look_ahead, offset_frame, work, motion)
-    return project_state(get_state_row(motion.smooth, ROW_END), offset_frame, work, motion)
+    prepare_extrapolated_step(pace.look_ahead, offset_frame, scratch, motion)
+    try_extrapolated_step(pace.look_ahead, offset_frame, scratch, motion)
+    return project_state(get_state_row(motion.smooth, ROW_END), offset_frame, scratch, motion)

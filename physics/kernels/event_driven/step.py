@@ -93,141 +93,145 @@ _NO_FORCED_MODE = -1
 
 
 @kernel
-def set_event_thresholds(y, h, offset_frame, work, motion):
+def set_event_thresholds(y, h, offset_frame, scratch, motion):
     """Set the gap and speed that count as zero, and the look-ahead of a mode; problems are solved to rounding.
 
     The gap that counts as zero covers the rounding of any place that the body may reach within h. The speed that counts
     as zero lifts a contact by less than `_UNSEEN_HOP_GAPS` such gaps. In a lower bounce the energy error of setting the
     body down on the wall would be as large as the loss of the impact.
     """
+    body = scratch.body
     thresholds = motion.thresholds
-    work.residual_limit = work.target_error_limit = 0.0
-    x, speed = y[0], body_speed_bound(y, offset_frame, work)
-    thresholds.touch_gap = max(work.slop, _ROUNDING * (work.radius + math.sqrt(qt.dot(x, x)) + h * speed))
+    scratch.stage.residual_limit = scratch.stage.target_error_limit = 0.0
+    x, speed = y[0], body_speed_bound(y, offset_frame, body)
+    thresholds.touch_gap = max(body.slop, _ROUNDING * (body.radius + math.sqrt(qt.dot(x, x)) + h * speed))
     thresholds.rounding_speed = 1.0e-13 * speed
-    hop = 2.0 * _UNSEEN_HOP_GAPS * work.acceleration * thresholds.touch_gap
+    hop = 2.0 * _UNSEEN_HOP_GAPS * body.acceleration * thresholds.touch_gap
     thresholds.rest_speed = math.sqrt(hop) + thresholds.rounding_speed
     thresholds.slip_stop_speed = _SLIP_STOP_SHARE * thresholds.rest_speed + thresholds.rounding_speed
-    unit = work.radius / (speed + math.sqrt(work.radius * work.acceleration) + _TINY)
+    unit = body.radius / (speed + math.sqrt(body.radius * body.acceleration) + _TINY)
     reset_chatter_control(unit, motion.pace)
-    thresholds.simultaneity_time = (_SIMULTANEOUS_SHARE + 10.0 * work.tolerance) * unit
+    thresholds.simultaneity_time = (_SIMULTANEOUS_SHARE + 10.0 * scratch.settings.tolerance) * unit
 
 
 @inlined
-def begin_event_substep(y, start, h, offset_frame, memory, work, motion):
+def begin_event_substep(y, start, h, offset_frame, memory, scratch, motion):
     """Prepare a part of length h that begins at the time `start` of the step."""
-    set_clock(start, work)
-    refresh_loads(y, 0.0, offset_frame, work)
-    set_event_thresholds(y, h, offset_frame, work, motion)
+    body = scratch.body
+    set_clock(start, body)
+    refresh_loads(y, 0.0, offset_frame, body)
+    set_event_thresholds(y, h, offset_frame, scratch, motion)
     motion.pace.assured_time = 0.0
-    load_contact_modes(memory, work.i, work, motion)
+    load_contact_modes(memory, body.i, scratch, motion)
     motion.pace.skipped_bounce_time, motion.pace.sequential_impacts = 0.0, 0
 
 
 @kernel
-def classify_mode(y, is_foretold, watched, contact, offset_frame, work, motion, report):
+def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motion, report):
     """Find the contact mode from y on; return whether a contact problem was solved, since the body may come to rest.
 
     If a guard has foretold the end of the contact mode, the next one is looked for a moment later.
     """
     seen, later = y, 0.0
     if is_foretold:
-        seen, later = predict_state(y, offset_frame, work, motion), motion.pace.look_ahead
+        seen, later = predict_state(y, offset_frame, scratch, motion), motion.pace.look_ahead
     motion.pace.assured_time = later
-    refresh_loads(seen, later, offset_frame, work)
-    what, n, v, L = find_contact_mode(seen, contact.friction, offset_frame, work, motion)
-    what = accept_step(what, watched, y, offset_frame, work, motion)
+    refresh_loads(seen, later, offset_frame, scratch.body)
+    what, n, v, L = find_contact_mode(seen, contact.friction, offset_frame, scratch, motion)
+    what = accept_step(what, watched, y, offset_frame, scratch, motion)
     if what not in (MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return what, False
     if n > 0:
-        P = principal_rotation(seen, offset_frame, work)
-        solved = solve_contacts(n, contact, v, L, P, work)
-        report_impact_solve(solved, report, work)
+        P = principal_rotation(seen, offset_frame, scratch.body)
+        solved = solve_contacts(n, contact, v, L, P, scratch)
+        report_impact_solve(solved, report, scratch)
         v, L = solved[0], solved[1]
     what = read_resting_mode(
-        n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, offset_frame, work, motion
+        n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, offset_frame, scratch, motion
     )
-    return accept_step(what, watched, y, offset_frame, work, motion), True
+    return accept_step(what, watched, y, offset_frame, scratch, motion), True
 
 
 @kernel
-def come_to_rest(y, t, offset_frame, work, motion, log, counts):
+def come_to_rest(y, t, offset_frame, scratch, motion, log, counts):
     """State of a body that rests from the time t on."""
     if motion.smooth.is_resting:
         return y
     motion.smooth.is_resting = 1
-    ev.note_mode_change(log, counts, work.i, t + motion.pace.skipped_bounce_time, ev.KIND_REST, -1)
-    x, q, _, _ = project_state(y, offset_frame, work, motion)
+    ev.note_mode_change(log, counts, scratch.body.i, t + motion.pace.skipped_bounce_time, ev.KIND_REST, -1)
+    x, q, _, _ = project_state(y, offset_frame, scratch, motion)
     return x, q, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @kernel
-def integrate_mode(what, y, t, h, flight, work, motion, report):
+def integrate_mode(what, y, t, h, flight, scratch, motion, report):
     """Move, fly or leap from y, at the time t of a part of length h: (state, its duration, guard that ended it)."""
+    body = scratch.body
     if what == MODE_INCONSISTENT:
-        report[work.world, at.FALLBACKS] += 1.0
+        report[body.world, at.FALLBACKS] += 1.0
         step = min(motion.pace.next_leap, h - t)
         lengthen_leap(t + step, motion.pace)
-        return drift_at_velocity(y, step, flight.offset_frame, work), step, GUARD_NONE
+        return drift_at_velocity(y, step, flight.offset_frame, body), step, GUARD_NONE
     if what == MODE_FLIGHT:
-        y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.offset_frame, work, motion, report)
+        y, step, is_found = fly_to_wall(y, h - t, flight.gyroscopic, flight.offset_frame, scratch, motion, report)
         if not is_found:
-            count_unresolved_flight(report, work)
+            count_unresolved_flight(report, body)
         return y, step, GUARD_NONE
-    return integrate_segment(y, h - t, flight.offset_frame, work, motion)
+    return integrate_segment(y, h - t, flight.offset_frame, scratch, motion)
 
 
 @kernel
-def advance(y, h, contact, flight, work, motion, records, start):
+def advance(y, h, contact, flight, scratch, motion, records, start):
     """State after h: each turn finds the mode of the body (`forced_mode` if it is known) and follows it.
 
     A step whose end has to be accepted (`mode_acceptance`) began at `rollback_state` and has the length `watched`.
     """
+    body = scratch.body
     pace = motion.pace
-    begin_event_substep(y, start, h, flight.offset_frame, records.memory, work, motion)
+    begin_event_substep(y, start, h, flight.offset_frame, records.memory, scratch, motion)
     t, forced_mode, is_foretold, rollback_state, watched = 0.0, _NO_FORCED_MODE, False, y, 0.0
-    for k in range(work.splits + 1):
-        if k == work.splits:
-            records.report[work.world, at.UNRESOLVED] += 1.0
+    for k in range(scratch.settings.splits + 1):
+        if k == scratch.settings.splits:
+            records.report[body.world, at.UNRESOLVED] += 1.0
             break
         if is_chattering(t, pace):
             forced_mode = MODE_INCONSISTENT
         mode, is_answer = forced_mode, False
         if forced_mode == _NO_FORCED_MODE:
             mode, is_answer = classify_mode(
-                y, is_foretold, watched, contact, flight.offset_frame, work, motion, records.report
+                y, is_foretold, watched, contact, flight.offset_frame, scratch, motion, records.report
             )
         forced_mode = _NO_FORCED_MODE
         if is_answer and mode in (MODE_IMPACT, MODE_INCONSISTENT):
             forced_mode, is_foretold = mode, False
             continue
         if mode == MODE_IMPACT:
-            y = resolve_impacts(y, start + t, contact, flight.offset_frame, work, motion, records)
+            y = resolve_impacts(y, start + t, contact, flight.offset_frame, scratch, motion, records)
         elif mode == MODE_INCONSISTENT:
             leap = min(pace.next_leap, h - t)
-            y = resolve_inconsistency(y, leap, start + t, contact, flight.offset_frame, work, motion, records)
+            y = resolve_inconsistency(y, leap, start + t, contact, flight.offset_frame, scratch, motion, records)
         elif mode == MODE_ROLLBACK:
             pace.watched_length = TRUST_SHRINK * watched
             y, t, watched, is_foretold = rollback_state, t - watched, 0.0, False
-            set_clock(start + t, work)
+            set_clock(start + t, body)
             continue
         if watched > 0.0:
             pace.watched_length, watched = TRUST_GROWTH * watched, 0.0
             if not t < h:
                 break
         if mode == MODE_IMPACT:
-            records.report[work.world, at.SPLITS] += 1.0
+            records.report[body.world, at.SPLITS] += 1.0
             pace.chatter_count -= motion.thresholds.is_sequential  # those in turn have a bound of their own
             is_foretold = False
             continue
-        log_mode_changes(work, motion, records.log, records.counts, start + t)
+        log_mode_changes(scratch, motion, records.log, records.counts, start + t)
         if mode == MODE_REST:
-            y = come_to_rest(y, start + t, flight.offset_frame, work, motion, records.log, records.counts)
+            y = come_to_rest(y, start + t, flight.offset_frame, scratch, motion, records.log, records.counts)
             break
         motion.smooth.is_resting, rollback_state = 0, y
-        y, step, guard = integrate_mode(mode, y, t, h, flight, work, motion, records.report)
+        y, step, guard = integrate_mode(mode, y, t, h, flight, scratch, motion, records.report)
         t += step
-        set_clock(start + t, work)
+        set_clock(start + t, body)
         adapt_look_ahead(step, guard, motion)
         pace.skipped_bounce_time, pace.sequential_impacts = 0.0, 0
         if guard == GUARD_WATCH:
@@ -237,43 +241,44 @@ def advance(y, h, contact, flight, work, motion, records, start):
         elif guard == GUARD_STEP_FAILED:
             forced_mode = MODE_INCONSISTENT
         is_foretold = guard in FORCE_GUARDS
-    store_contact_modes(records.memory, work.i, work, motion)
+    store_contact_modes(records.memory, body.i, scratch, motion)
     return y
 
 
-def _fly_substep(y, h, contact, flight, work, motion, records, start):
+def _fly_substep(y, h, contact, flight, scratch, motion, records, start):
     motion.contacts.count = 0
-    set_clock(start, work)
-    return fly_freely(y, h, flight.gyroscopic, flight.offset_frame, work, motion, records.report)
+    set_clock(start, scratch.body)
+    return fly_freely(y, h, flight.gyroscopic, flight.offset_frame, scratch, motion, records.report)
 
 
 @if_given("contact.acts", _fly_substep)
-def _take_substep(y, h, contact, flight, work, motion, records, start):
+def _take_substep(y, h, contact, flight, scratch, motion, records, start):
     """State after a substep that begins at the time `start` of the step."""
-    return advance(y, h, contact, flight, work, motion, records, start)
+    return advance(y, h, contact, flight, scratch, motion, records, start)
 
 
 @inlined
-def advance_world(world, grid, bodies, contact, restitution, flight, records, work, motion):
+def advance_world(world, grid, bodies, contact, restitution, flight, records, scratch, motion):
     """Advance each body of a world by `grid.steps` steps, from event to event.
 
     Events go to `records.log`, their number to `records.counts`; otherwise as in time stepping.
     """
+    body = scratch.body
     h, count = grid.h, bodies.shapes.shape[0]
     clear_report(world, records.report)
     for b in range(count):
         i = world * count + b
         records.counts[i] = 0
-        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
-        if not has_finite_loads(work):
+        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, body)
+        if not has_finite_loads(body):
             report_fault(world, b, records.report)
             ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
             continue
-        bind_fields(bodies.params, i, None, work)
-        bind_laws(bodies.params, i, work)
+        bind_fields(bodies.params, i, None, body)
+        bind_laws(bodies.params, i, body)
         y = read_state(bodies.state, i)
         for k in range(grid.steps * grid.substeps):
-            new = _take_substep(y, h, contact, flight, work, motion, records, k * h)
+            new = _take_substep(y, h, contact, flight, scratch, motion, records, k * h)
             if not is_finite(new):
                 report_fault(world, b, records.report)
                 ev.drop_events(i, 1, k * h, records.log, records.counts)
@@ -281,7 +286,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, wo
                 break
             y = new
         write_state(bodies.state, i, y)
-        w = angular_velocity(y[1], y[3], work, flight.offset_frame)
+        w = angular_velocity(y[1], y[3], body, flight.offset_frame)
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
 
 

@@ -101,42 +101,43 @@ def gap_safe_time(g, r, b, third, horizon):
 
 
 @kernel
-def gap_jerk_bound(y, left, offset_frame, work):
+def gap_jerk_bound(y, left, offset_frame, body):
     """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
-    if work.shape == SPHERE:
+    if body.shape == SPHERE:
         return 0.0
-    t = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    j = max(work.J[0], work.J[1], work.J[2])
-    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], work, offset_frame), y[3]))) + j * left * t
+    t = math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
+    j = max(body.J[0], body.J[1], body.J[2])
+    w = math.sqrt(j * max(0.0, qt.dot(angular_velocity(y[1], y[3], body, offset_frame), y[3]))) + j * left * t
     a = j * t + w * w
     b = (1.0 + math.sqrt(2.0)) * w * a + j * w * t
-    bound = work.radius * (b + 3.0 * w * a + w * w * w)
-    if work.shape == ELLIPSOID:
-        d = work.dims
+    bound = body.radius * (b + 3.0 * w * a + w * w * w)
+    if body.shape == ELLIPSOID:
+        d = body.dims
         ratio = max(d[0], d[1], d[2]) / min(d[0], d[1], d[2])
         bound *= 3.0 * ratio * ratio
     return bound
 
 
 @kernel
-def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
+def safe_flight_time(y, left, third, assured, offset_frame, scratch, thresholds):
     """Time within which no feature at y can reach a wall, at most `left`.
 
     Features that touch and do not approach stay away for `assured_time` at least: just after a push has ended, the
     acceleration that lifts them is still zero.
     """
+    scene, body = scratch.scene, scratch.body
     x, v = y[0], y[2]
-    R, _, w, alpha = free_angular_motion(y, offset_frame, work)
-    dims, a, shape = as_vector(work.dims), as_vector(work.free_acceleration), work.shape
+    R, _, w, alpha = free_angular_motion(y, offset_frame, body)
+    dims, a, shape = as_vector(body.dims), as_vector(body.free_acceleration), body.shape
     t = left
-    for k in range(work.walls.shape[0]):
-        n = wall_normal(work.walls, k)
-        d = qt.dot(n, x) - work.walls[k, WALL_OFFSET]
+    for k in range(scene.walls.shape[0]):
+        n = wall_normal(scene.walls, k)
+        d = qt.dot(n, x) - scene.walls[k, WALL_OFFSET]
         vn, an = qt.dot(n, v), qt.dot(n, a)
-        if d - work.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
+        if d - body.radius + min(0.0, t * vn) + min(0.0, 0.5 * t * t * an) > 0.0:
             continue
-        for feature in range(work.features):
-            r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, work)
+        for feature in range(scene.features):
+            r, rate = contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, body)
             gap = d + qt.dot(n, r)
             speed = vn + qt.dot(n, qt.cross(w, r))
             bend = an + qt.dot(n, plus(qt.cross(alpha, r), qt.cross(w, rate)))
@@ -148,14 +149,14 @@ def safe_flight_time(y, left, third, assured, offset_frame, work, thresholds):
 
 
 @inlined
-def has_torque(work):
+def has_torque(body):
     """True if a torque acts."""
-    t = work.torque
+    t = body.torque
     return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
 
 
 @kernel
-def integrate_free_flight(y, t, offset_frame, work, motion):
+def integrate_free_flight(y, t, offset_frame, scratch, motion):
     """Free motion under a torque or in fields over t by extrapolated steps: (state, time left)."""
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
@@ -163,73 +164,75 @@ def integrate_free_flight(y, t, offset_frame, work, motion):
     motion.pace.step_length = left
     while left > 0.0 and tries < _MAX_FLIGHT_STEPS:
         tries += 1
-        h = prepare_extrapolated_step(left, offset_frame, work, motion)
-        error, _ = try_extrapolated_step(h, offset_frame, work, motion)
-        if not error <= work.tolerance and h > SEGMENT_SHORTEST_STEP * t:
+        h = prepare_extrapolated_step(left, offset_frame, scratch, motion)
+        error, _ = try_extrapolated_step(h, offset_frame, scratch, motion)
+        if not error <= scratch.settings.tolerance and h > SEGMENT_SHORTEST_STEP * t:
             motion.pace.step_length = SEGMENT_STEP_CUT * h
             continue
         for c in range(Y_SIZE):
             smooth.y[ROW_START, c] = smooth.y[ROW_END, c]
         left -= h
-        advance_clock(h, work)
+        advance_clock(h, scratch.body)
         motion.pace.step_length = 2.0 * h
     return get_state_row(smooth, ROW_START), left
 
 
 @inlined
-def count_unresolved_flight(report, work):
+def count_unresolved_flight(report, body):
     """Count a flight that extrapolated steps cannot follow; with fields, they are not resolved."""
-    report[work.world, at.UNRESOLVED] += 1.0
-    if has_fields(work):
-        report[work.world, at.UNRESOLVED_MOTION] += 1.0
+    report[body.world, at.UNRESOLVED] += 1.0
+    if has_fields(body):
+        report[body.world, at.UNRESOLVED_MOTION] += 1.0
 
 
 @kernel
-def fly_freely(y, t, gyroscopic, offset_frame, work, motion, report):
+def fly_freely(y, t, gyroscopic, offset_frame, scratch, motion, report):
     """State after the time t without contact.
 
     A body that turns or swings faster than extrapolated steps can follow moves by time stepping for the rest of t,
     which is reported.
     """
-    if has_torque(work) or has_fields(work):
-        reset_felt_flag(work)
-        end, left = integrate_free_flight(y, t, offset_frame, work, motion)
+    body = scratch.body
+    if has_torque(body) or has_fields(body):
+        reset_felt_flag(body)
+        end, left = integrate_free_flight(y, t, offset_frame, scratch, motion)
         if left > 0.0:
-            count_unresolved_flight(report, work)
-            hold_loads(end, left, gyroscopic, offset_frame, work)
-            rest = fly(end, work, left, gyroscopic, offset_frame)
-            end = subdivide_stiff_flight(rest, end, left, FlightSwitches(gyroscopic, offset_frame, None), work)
-        if has_felt_field(work):
+            count_unresolved_flight(report, body)
+            hold_loads(end, left, gyroscopic, offset_frame, body)
+            rest = fly(end, body, left, gyroscopic, offset_frame)
+            end = subdivide_stiff_flight(rest, end, left, FlightSwitches(gyroscopic, offset_frame, None), body)
+        if has_felt_field(body):
             return end
-    return fly(y, work, t, gyroscopic, offset_frame)
+    return fly(y, body, t, gyroscopic, offset_frame)
 
 
 @kernel
-def fly_to_wall(y, left, gyroscopic, offset_frame, work, motion, report):
+def fly_to_wall(y, left, gyroscopic, offset_frame, scratch, motion, report):
     """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
 
     The flight may end earlier, if a feature flies so close along a wall that `_MAX_ADVANCES` steps did not decide: no
     wall is missed.
     """
+    body = scratch.body
     motion.contacts.count = 0
-    if has_fields(work):
-        now = reset_felt_flag(work)
-        end, t, guard = integrate_segment(y, left, offset_frame, work, motion)
-        if has_felt_field(work):
+    if has_fields(body):
+        now = reset_felt_flag(body)
+        end, t, guard = integrate_segment(y, left, offset_frame, scratch, motion)
+        if has_felt_field(body):
             return end, t, guard != GUARD_STEP_FAILED
-        set_now(now, work)
-        refresh_loads(y, 0.0, offset_frame, work)
-    if is_flight_clear(y[0], y[2], left, work):
-        return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True
-    third = gap_jerk_bound(y, left, offset_frame, work)
+        set_now(now, body)
+        refresh_loads(y, 0.0, offset_frame, body)
+    if is_flight_clear(y[0], y[2], left, scratch):
+        return fly_freely(y, left, gyroscopic, offset_frame, scratch, motion, report), left, True
+    third = gap_jerk_bound(y, left, offset_frame, body)
     now, t = y, 0.0
     for _ in range(_MAX_ADVANCES):
         assured = motion.pace.assured_time if t == 0.0 else 0.0
-        step = safe_flight_time(now, left - t, third, assured, offset_frame, work, motion.thresholds)
+        step = safe_flight_time(now, left - t, third, assured, offset_frame, scratch, motion.thresholds)
         if t + step >= left:
-            return fly_freely(y, left, gyroscopic, offset_frame, work, motion, report), left, True
+            return fly_freely(y, left, gyroscopic, offset_frame, scratch, motion, report), left, True
         t += step
-        now = fly_freely(y, t, gyroscopic, offset_frame, work, motion, report)
+        now = fly_freely(y, t, gyroscopic, offset_frame, scratch, motion, report)
         if step <= _LAST_ADVANCE_SHARE * left:
             break
     return now, t, True

@@ -10,25 +10,25 @@ from physics.kernels.state.body import body_attitude, principal_attitude
 
 
 @inlined
-def drift_attitude(q, L, work, h, gyroscopic, offset_frame):
+def drift_attitude(q, L, body, h, gyroscopic, offset_frame):
     """Attitude after h with constant angular momentum L, exact to rounding."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return q
     if gyroscopic is None:
-        return isotropic_rotation(q, L, work.J[0], h)
-    principal = principal_attitude(q, work, offset_frame)
-    return body_attitude(free_rotation(principal, L, as_vector(work.J), work.series, h), work, offset_frame)
+        return isotropic_rotation(q, L, body.J[0], h)
+    principal = principal_attitude(q, body, offset_frame)
+    return body_attitude(free_rotation(principal, L, as_vector(body.J), body.series, h), body, offset_frame)
 
 
 @inlined
-def fly(y, work, h, gyroscopic, offset_frame):
+def fly(y, body, h, gyroscopic, offset_frame):
     """State (x, q, v, L) after h under the constant acceleration and torque of the step.
 
     The parabola is exact. Without torque so is the rotation; with torque it is the Strang splitting of second
     order: half a free rotation, the angular impulse, half a free rotation.
     """
     x, q, v, L = y
-    a, torque = work.free_acceleration, work.torque
+    a, torque = body.free_acceleration, body.torque
     half = 0.5 * h * h
     x = (
         x[0] + h * v[0] + half * a[0],
@@ -37,23 +37,23 @@ def fly(y, work, h, gyroscopic, offset_frame):
     )
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     if torque[0] == 0.0 and torque[1] == 0.0 and torque[2] == 0.0:
-        return x, drift_attitude(q, L, work, h, gyroscopic, offset_frame), v, L
-    q = drift_attitude(q, L, work, 0.5 * h, gyroscopic, offset_frame)
+        return x, drift_attitude(q, L, body, h, gyroscopic, offset_frame), v, L
+    q = drift_attitude(q, L, body, 0.5 * h, gyroscopic, offset_frame)
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    return x, drift_attitude(q, L, work, 0.5 * h, gyroscopic, offset_frame), v, L
+    return x, drift_attitude(q, L, body, 0.5 * h, gyroscopic, offset_frame), v, L
 
 
-def _fly_exactly(y, h, flight, work):
-    return fly(y, work, h, flight.gyroscopic, flight.offset_frame)
+def _fly_exactly(y, h, flight, body):
+    return fly(y, body, h, flight.gyroscopic, flight.offset_frame)
 
 
 @if_given("flight.scheme", _fly_exactly)
-def integrate_flight(y, h, flight, work):
+def integrate_flight(y, h, flight, body):
     """Free motion over h: the exact flow, or a textbook scheme (codes of `physics.kernels.flight.integrators`)."""
     x, q, v, L = y
-    q = principal_attitude(q, work, flight.offset_frame)
+    q = principal_attitude(q, body, flight.offset_frame)
     zero = (0.0, 0.0, 0.0)
-    load = integrators.Load(zero, as_vector(work.torque), as_vector(work.free_acceleration))
-    inertia = integrators.Inertia(1.0, as_vector(work.J))
+    load = integrators.Load(zero, as_vector(body.torque), as_vector(body.free_acceleration))
+    inertia = integrators.Inertia(1.0, as_vector(body.J))
     x, q, v, L = integrators.step(flight.scheme, (x, q, v, L), load, inertia, h)
-    return x, body_attitude(q, work, flight.offset_frame), v, L
+    return x, body_attitude(q, body, flight.offset_frame), v, L

@@ -32,11 +32,11 @@ WORK_ERROR_SHARE = UNRESOLVED_GAIN_SHARE = 0.01
 
 
 @inlined
-def potential_energy(y, later, offset_frame, work):
+def potential_energy(y, later, offset_frame, body):
     """Potential energy of all fields at y, `later` [s] than now [J]."""
     x, q, v, L = y
-    t = work.now + later
-    return total_energy(field_state(x, q, v, L, t, offset_frame, work), t, work)
+    t = body.now + later
+    return total_energy(field_state(x, q, v, L, t, offset_frame, body), t, body)
 
 
 @inlined
@@ -46,67 +46,67 @@ def _middle(y, end):
 
 
 @inlined
-def constant_loads(work):
+def constant_loads(body):
     """Acceleration and torque held over the step."""
-    a, T = work.held_acceleration, work.held_torque
+    a, T = body.held_acceleration, body.held_torque
     return (a[0], a[1], a[2]), (T[0], T[1], T[2])
 
 
 @kernel
-def energy_gain(y, end, h, offset_frame, work):
+def energy_gain(y, end, h, offset_frame, body):
     """(energy created by a stage from y to `end`, its kinetic energy, rounding of both) [J]."""
     x, q, v, L = _middle(y, end)
     before, after = (
-        kinetic_energy(y[1], y[2], y[3], work, offset_frame),
-        kinetic_energy(end[1], end[2], end[3], work, offset_frame),
+        kinetic_energy(y[1], y[2], y[3], body, offset_frame),
+        kinetic_energy(end[1], end[2], end[3], body, offset_frame),
     )
-    low, high = potential_energy(y, 0.0, offset_frame, work), potential_energy(end, h, offset_frame, work)
-    a, T = constant_loads(work)
-    done = work.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(q, L, work, offset_frame))
-    t = work.now + 0.5 * h
-    supply = h * total_supplied_power(field_state(x, q, v, L, t, offset_frame, work), t, work)
+    low, high = potential_energy(y, 0.0, offset_frame, body), potential_energy(end, h, offset_frame, body)
+    a, T = constant_loads(body)
+    done = body.mass * qt.dot(a, minus(end[0], y[0])) + h * qt.dot(T, angular_velocity(q, L, body, offset_frame))
+    t = body.now + 0.5 * h
+    supply = h * total_supplied_power(field_state(x, q, v, L, t, offset_frame, body), t, body)
     rounding = ENERGY_ROUNDING * (before + after + abs(low) + abs(high) + abs(done) + supply)
     return (after + high) - (before + low) - done - supply, after, rounding
 
 
 @if_declared(False)
-def has_work_error(y, end, h, offset_frame, work):
+def has_work_error(y, end, h, offset_frame, body):
     """True if the work of explicit loads from y to `end` misses the change of the fields' energy."""
     x, q, v, L = _middle(y, end)
-    t = work.now + 0.5 * h
-    state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, offset_frame, work)
-    F, T = total_conservative_load(state, t, work)
-    low, high = potential_energy(y, 0.0, offset_frame, work), potential_energy(end, h, offset_frame, work)
-    motion = kinetic_energy(y[1], y[2], y[3], work, offset_frame) + kinetic_energy(
-        end[1], end[2], end[3], work, offset_frame
+    t = body.now + 0.5 * h
+    state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, offset_frame, body)
+    F, T = total_conservative_load(state, t, body)
+    low, high = potential_energy(y, 0.0, offset_frame, body), potential_energy(end, h, offset_frame, body)
+    motion = kinetic_energy(y[1], y[2], y[3], body, offset_frame) + kinetic_energy(
+        end[1], end[2], end[3], body, offset_frame
     )
     missed = high - low + h * (qt.dot(F, state.v) + qt.dot(T, state.w))
     return abs(missed) > WORK_ERROR_SHARE * motion + ENERGY_ROUNDING * (abs(low) + abs(high))
 
 
-def _as_it_is(y, end, h, is_free, offset_frame, work):
+def _as_it_is(y, end, h, is_free, offset_frame, body):
     return end
 
 
 @if_declared(_as_it_is)
-def limit_energy_gain(y, end, h, is_free, offset_frame, work):
+def limit_energy_gain(y, end, h, is_free, offset_frame, body):
     """State `end` of a stage of length h from y, without the energy that the stage created.
 
     If the motion is too small for the excess, the body is back at y: reversed in free flight (`is_free`), without
     velocity in contact.
     """
-    if work.is_stiff == 0:
+    if body.is_stiff == 0:
         return end
-    gain, motion, rounding = energy_gain(y, end, h, offset_frame, work)
+    gain, motion, rounding = energy_gain(y, end, h, offset_frame, body)
     if gain <= rounding:
         return end
     if gain > UNRESOLVED_GAIN_SHARE * motion:
-        work.is_coarse = 1
+        body.is_coarse = 1
     x, q, v, L = end
     if gain < motion:
         s = math.sqrt(1.0 - gain / motion)
     else:
-        work.is_put_back = 1
+        body.is_put_back = 1
         x, q, v, L = y
         s = -1.0 if is_free else 0.0
     return x, q, times(s, v), times(s, L)

@@ -1,6 +1,6 @@
-"""Dispatch to the fields that a kernel is compiled for, by the *type* of the workspace.
+"""Dispatch to the fields that a kernel is compiled for, by the *type* of a body's record.
 
-A scene's fields are members of its workspace record: one marker per kind of field, `load_drag_1x3` for one `Drag` of
+A scene's fields are members of the record of each body: one marker per kind of field, `load_drag_1x3` for one `Drag` of
 three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
 fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
 with a digest of its source: an edit is another type.
@@ -28,7 +28,7 @@ class Term(NamedTuple):
     Attributes
     ----------
     marker : str
-        Member of the workspace.
+        Member of a body's record.
     function : dispatcher
         (state, parameters, time) -> (force, torque), or -> velocity of the air.
     energy : dispatcher or None
@@ -64,12 +64,12 @@ _KNOWN: dict[str, Term] = {}
 
 
 def register_terms(terms: tuple[Term, ...]) -> None:
-    """Register terms before a kernel is compiled for a workspace that holds their markers."""
+    """Register terms before a kernel is compiled for a record that holds their markers."""
     _KNOWN.update((term.marker, term) for term in terms)
 
 
 def term_members(terms: tuple[Term, ...]) -> list[tuple]:
-    """Members of a workspace for these terms; none without terms."""
+    """Members of a body's record for these terms; none without terms."""
     if not terms:
         return []
     columns = sum(term.count * term.size for term in terms)
@@ -99,7 +99,7 @@ def _markers(names) -> list[str]:
 
 
 def if_declared(otherwise=None):
-    """Make a kernel of a function whose last argument is the workspace; without fields it only returns `otherwise`.
+    """Make a kernel of a function whose last argument is a body; without fields it only returns `otherwise`.
 
     A function for `otherwise` is called instead. That is inlined: nothing is left of it.
     """
@@ -115,10 +115,10 @@ def _has_unknown(names: list[str]) -> bool:
     return any(_KNOWN[name].rates is None for name in _markers(names) if name.startswith(LOAD))
 
 
-def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
-    """Each field of this kind in a workspace: its term, first and last column."""
+def iterate_terms(body, kind: str) -> Iterator[tuple[Term, int, int]]:
+    """Each field of this kind in a body's record: its term, first and last column."""
     first = 0
-    for marker in _markers(members(work)):
+    for marker in _markers(members(body)):
         term = _KNOWN[marker]
         for _ in range(term.count):
             if marker.startswith(kind):
@@ -127,11 +127,11 @@ def iterate_terms(work, kind: str) -> Iterator[tuple[Term, int, int]]:
 
 
 def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
-    """Make a kernel (state, t, work) that adds up chosen functions of a workspace's fields."""
+    """Make a kernel (state, t, body) that adds up chosen functions of a body's fields."""
 
-    def total(state, t, work):
+    def total(state, t, body):
         result = start
-        for term, first, last in iterate_terms(work, kind):
+        for term, first, last in iterate_terms(body, kind):
             if chosen(term) is not None:
                 result = add(runtime_kernel(result), chosen(term), first, last)
         return result
@@ -139,11 +139,11 @@ def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
     return by_type(total)
 
 
-def _no_load(state, t, work):
+def _no_load(state, t, body):
     return ZERO, ZERO
 
 
-def _no_air(state, t, work):
+def _no_air(state, t, body):
     return ZERO
 
 
@@ -156,48 +156,48 @@ def _of_middle(function):
     return load
 
 
-def _no_energy(state, t, work):
+def _no_energy(state, t, body):
     return 0.0
 
 
 def _add_load(before, function, first, last):
-    def add(state, t, work):
-        F, T = before(state, t, work)
-        f, m = function(state, work.columns[first:last], t)
+    def add(state, t, body):
+        F, T = before(state, t, body)
+        f, m = function(state, body.columns[first:last], t)
         return plus(F, f), plus(T, m)
 
     return add
 
 
-def _no_rates(state, h, work):
+def _no_rates(state, h, body):
     return ZERO
 
 
 def _add_rates(before, function, first, last):
-    def add(state, h, work):
-        return plus(before(state, h, work), function(state, work.columns[first:last], work.J, h))
+    def add(state, h, body):
+        return plus(before(state, h, body), function(state, body.columns[first:last], body.J, h))
 
     return add
 
 
 def _add_supply(before, function, first, last):
-    def add(state, t, work):
-        F, T = function(state, work.columns[first:last], t)
-        return before(state, t, work) + max(dot(F, state.v) + dot(T, state.w), 0.0)
+    def add(state, t, body):
+        F, T = function(state, body.columns[first:last], t)
+        return before(state, t, body) + max(dot(F, state.v) + dot(T, state.w), 0.0)
 
     return add
 
 
 def _add_number(before, function, first, last):
-    def add(state, t, work):
-        return before(state, t, work) + function(state, work.columns[first:last], t)
+    def add(state, t, body):
+        return before(state, t, body) + function(state, body.columns[first:last], t)
 
     return add
 
 
 def _add_vector(before, function, first, last):
-    def add(state, t, work):
-        return plus(before(state, t, work), function(state, work.columns[first:last], t))
+    def add(state, t, body):
+        return plus(before(state, t, body), function(state, body.columns[first:last], t))
 
     return add
 
@@ -215,10 +215,10 @@ total_supplied_power = _sum(LOAD, _no_energy, lambda term: term.function if term
 total_user_load = _sum(LOAD, _no_load, lambda term: term.function if term.rates is None else None, _add_load)
 
 
-def _mean_load(states, t, work):
+def _mean_load(states, t, body):
     """Mean load of all fields over a stage, by discrete gradients, from `states` at its middle, start and end."""
     result = _no_load
-    for term, first, last in iterate_terms(work, LOAD):
+    for term, first, last in iterate_terms(body, LOAD):
         mean = runtime_kernel(_of_middle(term.function)) if term.mean is None else term.mean
         result = _add_load(runtime_kernel(result), mean, first, last)
     return result
@@ -227,21 +227,21 @@ def _mean_load(states, t, work):
 total_mean_load = by_type(_mean_load, _mean_load)
 
 
-def _as_it_is(loads, h, R, state, work):
+def _as_it_is(loads, h, R, state, body):
     return loads
 
 
 def _then_soften(before, function, first, last):
-    def soften(loads, h, R, state, work):
-        return function(before(loads, h, R, state, work), h, R, state, work.columns[first:last], work.J)
+    def soften(loads, h, R, state, body):
+        return function(before(loads, h, R, state, body), h, R, state, body.columns[first:last], body.J)
 
     return soften
 
 
-def _softened(loads, h, R, state, work):
+def _softened(loads, h, R, state, body):
     """Acceleration and torque softened by the implicit step over h, one field after the other."""
     result = _as_it_is
-    for term, first, last in iterate_terms(work, LOAD):
+    for term, first, last in iterate_terms(body, LOAD):
         if term.soften is not None:
             result = _then_soften(runtime_kernel(result), term.soften, first, last)
     return result

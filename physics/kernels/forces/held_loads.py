@@ -1,6 +1,6 @@
 """Acceleration and torque of a step with fields: loads that are held, and when fields are evaluated.
 
-Without fields `work.free_acceleration` and `work.torque` are what gravity and the wrench make them, for the whole
+Without fields `body.free_acceleration` and `body.torque` are what gravity and the wrench make them, for the whole
 call. With fields they are set anew:
 
 - time stepping holds over a stage of length h the loads of its *middle* (`hold_loads`): place and attitude there are
@@ -45,88 +45,88 @@ EXPLICIT_TURN = 1.0e-4
 
 
 @if_declared()
-def bind_fields(params, i, scheme, work):
-    """Store the fields' parameters of body i, and the step's held loads, in `work`.
+def bind_fields(params, i, scheme, body):
+    """Store the fields' parameters of body i, and the step's held loads, in `body`.
 
     A textbook scheme (`scheme` not None) keeps its explicit loads at any step: it is there to show what they do.
     """
-    for c in range(work.columns.shape[0]):
-        work.columns[c] = params[i, at.PARAM_SIZE + c]
+    for c in range(body.columns.shape[0]):
+        body.columns[c] = params[i, at.PARAM_SIZE + c]
     for c in range(3):
-        work.held_acceleration[c] = work.free_acceleration[c]
-        work.held_torque[c] = work.torque[c]
-    work.is_stiff = work.is_coarse = work.is_put_back = 0
-    work.is_textbook = 0 if scheme is None else 1
+        body.held_acceleration[c] = body.free_acceleration[c]
+        body.held_torque[c] = body.torque[c]
+    body.is_stiff = body.is_coarse = body.is_put_back = 0
+    body.is_textbook = 0 if scheme is None else 1
 
 
 @if_declared()
-def set_clock(elapsed, work):
+def set_clock(elapsed, body):
     """Set the time since the start of the call [s]."""
-    work.now = work.call_start + elapsed
+    body.now = body.call_start + elapsed
 
 
 @if_declared()
-def advance_clock(h, work):
+def advance_clock(h, body):
     """Advance the time since the start of the call by [s]."""
-    work.now += h
+    body.now += h
 
 
 @if_declared()
-def hold_loads(y, h, gyroscopic, offset_frame, work):
+def hold_loads(y, h, gyroscopic, offset_frame, body):
     """Hold the loads of the middle of a flight of length h that starts at y, now."""
     x, q, v, L = y
     half = 0.5 * h
-    t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
+    t = body.now + half
+    q = drift_attitude(q, L, body, half, gyroscopic, offset_frame)
     x = plus(x, times(half, v))
-    state = field_state(x, q, v, L, t, offset_frame, work)
-    F, T = total_load(state, t, work)
-    check_stage_resolution(y, (F, T), x, q, h, offset_frame, work)
-    turn = note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, work), h, work)
-    if work.is_stiff == 1:
+    state = field_state(x, q, v, L, t, offset_frame, body)
+    F, T = total_load(state, t, body)
+    check_stage_resolution(y, (F, T), x, q, h, offset_frame, body)
+    turn = note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, body), h, body)
+    if body.is_stiff == 1:
         apply_total_loads(
-            soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, offset_frame, work), state, work), work
+            soften_loads(add_held_loads(F, T, body), h, principal_axes_matrix(q, offset_frame, body), state, body), body
         )
         return
     for _ in range(MIDPOINT_ROUNDS):
-        state = kicked_state(x, q, v, L, (F, T), half, half, offset_frame, work)
-        before, (F, T) = (F, T), total_load(state, t, work)
-        if work.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
+        state = kicked_state(x, q, v, L, (F, T), half, half, offset_frame, body)
+        before, (F, T) = (F, T), total_load(state, t, body)
+        if body.is_textbook == 1 or not half * turn > EXPLICIT_TURN or (before[0] == F and before[1] == T):
             break
-    apply_loads(F, T, work)
+    apply_loads(F, T, body)
 
 
 @if_declared()
-def hold_contact_loads(y, h, gyroscopic, offset_frame, work):
+def hold_contact_loads(y, h, gyroscopic, offset_frame, body):
     """Hold the loads of the middle of a stage in contact, with the velocities of its start.
 
     Where the stage is stiff, those that depend on velocities are softened as if there were no contact.
     """
     x, q, v, L = y
     half = 0.5 * h
-    t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
+    t = body.now + half
+    q = drift_attitude(q, L, body, half, gyroscopic, offset_frame)
     x = plus(x, times(half, v))
-    state = field_state(x, q, v, L, t, offset_frame, work)
-    F, T = total_load(state, t, work)
-    check_stage_resolution(y, (F, T), x, q, h, offset_frame, work)
-    note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, work), h, work)
-    if work.is_stiff == 1:
-        still = add_held_loads(*field_load(x, q, state.air, ZERO, t, offset_frame, work), work)
+    state = field_state(x, q, v, L, t, offset_frame, body)
+    F, T = total_load(state, t, body)
+    check_stage_resolution(y, (F, T), x, q, h, offset_frame, body)
+    note_field_rates(state, kicked_state(x, q, v, L, (F, T), h, h, offset_frame, body), h, body)
+    if body.is_stiff == 1:
+        still = add_held_loads(*field_load(x, q, state.air, ZERO, t, offset_frame, body), body)
         slowed = soften_loads(
-            subtract_loads(add_held_loads(F, T, work), still),
+            subtract_loads(add_held_loads(F, T, body), still),
             h,
-            principal_axes_matrix(q, offset_frame, work),
+            principal_axes_matrix(q, offset_frame, body),
             state,
-            work,
+            body,
         )
-        apply_total_loads(add_loads(still, slowed), work)
+        apply_total_loads(add_loads(still, slowed), body)
         return
-    apply_loads(F, T, work)
+    apply_loads(F, T, body)
 
 
 @if_declared(False)
-def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
+def hold_mean_loads(y, end, h, gyroscopic, offset_frame, body):
     """Hold the loads of the middle of a stage in contact from y to `end`; return whether they have changed.
 
     Contacts may have changed the motion, so stiffness is tested again. In a stiff stage the change is softened: with A'
@@ -134,80 +134,80 @@ def hold_mean_loads(y, end, h, gyroscopic, offset_frame, work):
     """
     x, q, v, L = y
     half = 0.5 * h
-    t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
+    t = body.now + half
+    q = drift_attitude(q, L, body, half, gyroscopic, offset_frame)
     x, v, L = plus(x, times(half, v)), times(0.5, plus(v, end[2])), times(0.5, plus(L, end[3]))
-    state = field_state(x, q, v, L, t, offset_frame, work)
-    F, T = total_load(state, t, work)
-    a, torque = as_vector(work.free_acceleration), as_vector(work.torque)
-    was_stiff = work.is_stiff
-    note_field_rates(state, field_state(x, q, end[2], end[3], t, offset_frame, work), h, work)
+    state = field_state(x, q, v, L, t, offset_frame, body)
+    F, T = total_load(state, t, body)
+    a, torque = as_vector(body.free_acceleration), as_vector(body.torque)
+    was_stiff = body.is_stiff
+    note_field_rates(state, field_state(x, q, end[2], end[3], t, offset_frame, body), h, body)
     if was_stiff == 1:
-        work.is_stiff = 1
-    if work.is_stiff == 1:
+        body.is_stiff = 1
+    if body.is_stiff == 1:
         change = soften_loads(
-            subtract_loads(add_held_loads(F, T, work), (a, torque)),
+            subtract_loads(add_held_loads(F, T, body), (a, torque)),
             h,
-            principal_axes_matrix(q, offset_frame, work),
+            principal_axes_matrix(q, offset_frame, body),
             state,
-            work,
+            body,
         )
-        apply_total_loads(add_loads((a, torque), change), work)
+        apply_total_loads(add_loads((a, torque), change), body)
     else:
-        apply_loads(F, T, work)
-    return a != as_vector(work.free_acceleration) or torque != as_vector(work.torque)
+        apply_loads(F, T, body)
+    return a != as_vector(body.free_acceleration) or torque != as_vector(body.torque)
 
 
 @if_declared()
-def hold_softened_loads(y, h, gyroscopic, offset_frame, work):
+def hold_softened_loads(y, h, gyroscopic, offset_frame, body):
     """Hold the loads of an implicit step over h from y, with or without contact."""
     x, q, v, L = y
     half = 0.5 * h
-    t = work.now + half
-    q = drift_attitude(q, L, work, half, gyroscopic, offset_frame)
-    state = field_state(plus(x, times(half, v)), q, v, L, t, offset_frame, work)
-    F, T = total_load(state, t, work)
+    t = body.now + half
+    q = drift_attitude(q, L, body, half, gyroscopic, offset_frame)
+    state = field_state(plus(x, times(half, v)), q, v, L, t, offset_frame, body)
+    F, T = total_load(state, t, body)
     apply_total_loads(
-        soften_loads(add_held_loads(F, T, work), h, principal_axes_matrix(q, offset_frame, work), state, work), work
+        soften_loads(add_held_loads(F, T, body), h, principal_axes_matrix(q, offset_frame, body), state, body), body
     )
 
 
 @if_declared()
-def refresh_loads(y, later, offset_frame, work):
+def refresh_loads(y, later, offset_frame, body):
     """Let the loads at the state y act, `later` [s] than now."""
     x, q, v, L = y
-    F, T = field_load(x, q, v, L, work.now + later, offset_frame, work)
-    apply_loads(F, T, work)
-    if F != ZERO or T != ZERO or as_vector(work.held_torque) != ZERO:
-        work.is_felt = 1
+    F, T = field_load(x, q, v, L, body.now + later, offset_frame, body)
+    apply_loads(F, T, body)
+    if F != ZERO or T != ZERO or as_vector(body.held_torque) != ZERO:
+        body.is_felt = 1
 
 
 @if_declared(False)
-def has_fields(work):
+def has_fields(body):
     """True if the scene declares a field."""
     return True
 
 
 @if_declared(0.0)
-def time_now(work):
+def time_now(body):
     """Present time [s]."""
-    return work.now
+    return body.now
 
 
 @if_declared(0.0)
-def reset_felt_flag(work):
+def reset_felt_flag(body):
     """Clear the flag of `has_felt_field`; return the present time [s]."""
-    work.is_felt = 0
-    return work.now
+    body.is_felt = 0
+    return body.now
 
 
 @if_declared()
-def set_now(t, work):
+def set_now(t, body):
     """Set the present time [s]."""
-    work.now = t
+    body.now = t
 
 
 @if_declared(True)
-def has_felt_field(work):
+def has_felt_field(body):
     """True if a field, or a held torque, was nonzero anywhere since `reset_felt_flag`."""
-    return work.is_felt == 1
+    return body.is_felt == 1

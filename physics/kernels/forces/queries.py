@@ -17,14 +17,14 @@ def evaluate_fields(state, params, shapes, offset_frame, start, scratch, wrenche
 
     `wrenches` is zero at first: it is the wrench that is bound, too.
     """
-    work, bodies = scratch[0], BodyArrays(state, params, shapes, None, wrenches)
+    body, bodies = scratch[0], BodyArrays(state, params, shapes, None, wrenches)
     for i in range(state.shape[0]):
-        bind_body(i // shapes.shape[0], i, shapes[i % shapes.shape[0]], bodies, None, None, offset_frame, work)
-        bind_fields(params, i, None, work)
-        place_anchors_of_body(i, state, shapes.shape[0], work)
+        bind_body(i // shapes.shape[0], i, shapes[i % shapes.shape[0]], bodies, None, None, offset_frame, body)
+        bind_fields(params, i, None, body)
+        place_anchors_of_body(i, state, shapes.shape[0], body)
         x, q, v, L = read_state(state, i)
-        told = field_state(x, q, v, L, start, offset_frame, work)
-        F, T = total_load(told, start, work)
+        told = field_state(x, q, v, L, start, offset_frame, body)
+        F, T = total_load(told, start, body)
         for c in range(3):
             wrenches[i, c], wrenches[i, 3 + c] = F[c], T[c]
-        energies[i] = total_energy(told, start, work)
+        energies[i] = total_energy(told, start, body)

@@ -30,52 +30,52 @@ _NEARLY_CONVERGED = 1.0e-3
 
 
 @kernel
-def implicit_flight(y, h, flight, work):
+def implicit_flight(y, h, flight, body):
     """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from held loads.
 
     A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). If the iteration does not settle, the loads of the first step are kept.
     """
-    start = acting_loads(work)
-    size, loads = load_bound(start, work), start
+    start = acting_loads(body)
+    size, loads = load_bound(start, body), start
     for _ in range(_NEWTON_ROUNDS):
-        end = integrate_flight(y, h, flight, work)
-        change = newton_load_change(y, end, loads, h, flight.gyroscopic, flight.offset_frame, work)
+        end = integrate_flight(y, h, flight, body)
+        change = newton_load_change(y, end, loads, h, flight.gyroscopic, flight.offset_frame, body)
         loads = plus(loads[0], change[0]), plus(loads[1], change[1])
-        apply_total_loads(loads, work)
-        if load_bound(change, work) <= _CONVERGED * size:
+        apply_total_loads(loads, body)
+        if load_bound(change, body) <= _CONVERGED * size:
             break
-    if not load_bound(change, work) <= _NEARLY_CONVERGED * size:
-        apply_total_loads(start, work)
-    return integrate_flight(y, h, flight, work)
+    if not load_bound(change, body) <= _NEARLY_CONVERGED * size:
+        apply_total_loads(start, body)
+    return integrate_flight(y, h, flight, body)
 
 
-def _as_it_is(end, y, h, flight, work):
+def _as_it_is(end, y, h, flight, body):
     return end
 
 
 @if_declared(_as_it_is)
-def subdivide_stiff_flight(end, y, h, flight, work):
+def subdivide_stiff_flight(end, y, h, flight, body):
     """State `end` of a flight over h from y under held loads; stiff flights are made in parts."""
-    if work.is_stiff == 0:
+    if body.is_stiff == 0:
         return end
-    start, left, part = time_now(work), h, 0.0
+    start, left, part = time_now(body), h, 0.0
     for k in range(_MAX_PARTS):
-        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, work)
+        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, body)
         part = _PART_GROWTH * part
-        if work.rate > 0.0:
-            part = max(part, _FIRST_PART / work.rate)
+        if body.rate > 0.0:
+            part = max(part, _FIRST_PART / body.rate)
         if not 0.0 < part < left or k == _MAX_PARTS - 1:
             part = left
         if part < left:
-            hold_loads(y, part, flight.gyroscopic, flight.offset_frame, work)
-        if work.is_stiff == 1:
-            end = implicit_flight(y, part, flight, work)
+            hold_loads(y, part, flight.gyroscopic, flight.offset_frame, body)
+        if body.is_stiff == 1:
+            end = implicit_flight(y, part, flight, body)
         else:
-            end = integrate_flight(y, part, flight, work)
-        y = limit_energy_gain(y, end, part, True, flight.offset_frame, work)
+            end = integrate_flight(y, part, flight, body)
+        y = limit_energy_gain(y, end, part, True, flight.offset_frame, body)
         left -= part
-        advance_clock(part, work)
+        advance_clock(part, body)
         if not left > 0.0:
             break
-    set_now(start, work)
+    set_now(start, body)
     return y

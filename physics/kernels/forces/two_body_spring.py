@@ -107,9 +107,9 @@ def _if_linked(where, otherwise):
 
 
 def _record(bodies):
-    """Record of a body in a group with `work` (`multibody.data.arrays.Bodies`), or its type in the group's type."""
-    work = backend.member(bodies, "work")
-    return work[0] if len(getattr(work, "shape", ())) else work.dtype
+    """Record of a body in a group with `body` (`multibody.data.arrays.Bodies`), or its type in the group's type."""
+    body = backend.member(bodies, "body")
+    return body[0] if len(getattr(body, "shape", ())) else body.dtype
 
 
 @inlined
@@ -145,7 +145,7 @@ def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
 
     A body in contact keeps the velocities of the start of the stage, as in `held_loads.hold_contact_loads`.
     """
-    records, half = bodies.work, 0.5 * h
+    records, half = bodies.body, 0.5 * h
     for b in range(records.shape[0]):
         x, q, v, L = read_state(bodies.state, b)
         q = drift_attitude(q, L, records[b], half, gyroscopic, offset_frame)
@@ -168,22 +168,22 @@ def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, offset_frame, bodies):
     """Place the anchors of all springs by the bodies' `read_middle`."""
-    _put_anchors(first, count, offset_frame, bodies.work)
+    _put_anchors(first, count, offset_frame, bodies.body)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors_now(first, count, offset_frame, bodies):
     """Place the anchors of all springs at the bodies' present states."""
-    for b in range(bodies.work.shape[0]):
-        write_middle(bodies.work[b], read_state(bodies.state, b))
-    _put_anchors(first, count, offset_frame, bodies.work)
+    for b in range(bodies.body.shape[0]):
+        write_middle(bodies.body[b], read_state(bodies.state, b))
+    _put_anchors(first, count, offset_frame, bodies.body)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def unite_linked_bodies(first, count, parent, bodies):
     """Join the islands of bodies tied by a spring, in the table from each body to the first of its island."""
-    for b in range(bodies.work.shape[0]):
-        columns = bodies.work[b].columns
+    for b in range(bodies.body.shape[0]):
+        columns = bodies.body[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
             if columns[k + LINK_OTHER] >= 0.0:
                 unite_sets(b, int(columns[k + LINK_OTHER]), parent)
@@ -201,11 +201,11 @@ def _kick(body, half, offset_frame):
 
 
 @_if_linked(lambda arguments: arguments[-1], None)
-def place_anchors_of_body(first, count, i, state, bodies, work):
+def place_anchors_of_body(first, count, i, state, bodies, body):
     """Place the anchors of body i's springs at the present states of the other bodies of its world."""
     for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
-        if work.columns[k + LINK_OTHER] >= 0.0:
-            j = i - i % bodies + int(work.columns[k + LINK_OTHER])
+        if body.columns[k + LINK_OTHER] >= 0.0:
+            j = i - i % bodies + int(body.columns[k + LINK_OTHER])
             x, q, v, _ = read_state(state, j)
             w = (state[j, at.ANGVEL], state[j, at.ANGVEL + 1], state[j, at.ANGVEL + 2])
-            _put_anchor(k, work.columns, x, qt.to_matrix(q), v, w, 0.0)
+            _put_anchor(k, body.columns, x, qt.to_matrix(q), v, w, 0.0)

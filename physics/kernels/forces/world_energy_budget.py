@@ -45,19 +45,19 @@ def _potential(later, offset_frame, bodies):
     """Energy of all fields at the present places, `later` [s] than the start of the stage [J]."""
     place_anchors_now(offset_frame, bodies)
     total = 0.0
-    for b in range(bodies.work.shape[0]):
-        total += potential_energy(read_state(bodies.state, b), later, offset_frame, bodies.work[b])
+    for b in range(bodies.body.shape[0]):
+        total += potential_energy(read_state(bodies.state, b), later, offset_frame, bodies.body[b])
     return total
 
 
 @if_declared()
 def note_stage_energy(offset_frame, bodies, first):
     """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
-    if not _any_is_stiff(bodies.work):
+    if not _any_is_stiff(bodies.body):
         return
     first.stage_energy = _potential(0.0, offset_frame, bodies)
-    for b in range(bodies.work.shape[0]):
-        (x, q, v, L), m = read_state(bodies.state, b), bodies.work[b].stage_start
+    for b in range(bodies.body.shape[0]):
+        (x, q, v, L), m = read_state(bodies.state, b), bodies.body[b].stage_start
         m[0], m[1], m[2] = x
         m[3], m[4], m[5], m[6] = q
         m[7], m[8], m[9] = v
@@ -67,7 +67,7 @@ def note_stage_energy(offset_frame, bodies, first):
 @kernel
 def _gain_of(b, h, offset_frame, bodies):
     """(kinetic energy of body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
-    body, y, end = bodies.work[b], _start(bodies.work[b]), read_state(bodies.state, b)
+    body, y, end = bodies.body[b], _start(bodies.body[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = (
         kinetic_energy(y[1], y[2], y[3], body, offset_frame),
@@ -84,10 +84,10 @@ def _gain_of(b, h, offset_frame, bodies):
 def _common_velocities(ties, bodies):
     """Velocity of the common centre of mass, now and at the start of the stage; zero if walls hold the bodies."""
     mass, p, start = 0.0, ZERO, ZERO
-    for b in range(bodies.work.shape[0]):
-        m = bodies.work[b].mass
+    for b in range(bodies.body.shape[0]):
+        m = bodies.body[b].mass
         mass, p = mass + m, plus(p, times(m, read_state(bodies.state, b)[2]))
-        start = plus(start, times(m, _start(bodies.work[b])[2]))
+        start = plus(start, times(m, _start(bodies.body[b])[2]))
     if ties == 0:
         return ZERO, ZERO
     return times(1.0 / mass, p), times(1.0 / mass, start)
@@ -101,19 +101,19 @@ def _take(gain, ties, offset_frame, bodies):
     """
     c, start = _common_velocities(ties, bodies)
     motion = 0.0
-    for b in range(bodies.work.shape[0]):
+    for b in range(bodies.body.shape[0]):
         _, q, v, L = read_state(bodies.state, b)
-        motion += kinetic_energy(q, minus(v, c), L, bodies.work[b], offset_frame)
+        motion += kinetic_energy(q, minus(v, c), L, bodies.body[b], offset_frame)
     if gain > UNRESOLVED_GAIN_SHARE * motion:
-        for b in range(bodies.work.shape[0]):
-            bodies.work[b].is_coarse = 1
+        for b in range(bodies.body.shape[0]):
+            bodies.body[b].is_coarse = 1
     s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
     new = c if gain < motion else start
-    for b in range(bodies.work.shape[0]):
+    for b in range(bodies.body.shape[0]):
         x, q, v, L = read_state(bodies.state, b)
         if not gain < motion:
-            bodies.work[b].is_put_back = 1
-            x, q, _, _ = _start(bodies.work[b])
+            bodies.body[b].is_put_back = 1
+            x, q, _, _ = _start(bodies.body[b])
         write_state(bodies.state, b, (x, q, plus(new, times(s, minus(v, c))), times(s, L)))
 
 
@@ -123,11 +123,11 @@ def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
 
     `ties` is 1 for bodies that are held by each other only; `first` is the first body's record.
     """
-    if not _any_is_stiff(bodies.work):
+    if not _any_is_stiff(bodies.body):
         return
     high = _potential(h, offset_frame, bodies)
     gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
-    for b in range(bodies.work.shape[0]):
+    for b in range(bodies.body.shape[0]):
         more, measure = _gain_of(b, h, offset_frame, bodies)
         gain, size = gain + more, size + measure
     if gain > ENERGY_ROUNDING * size:
@@ -137,6 +137,6 @@ def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
 @if_declared()
 def report_unresolved_bodies(report, bodies, first):
     """Count the bodies that moved while some stage of the call did not resolve their fields."""
-    for b in range(bodies.work.shape[0]):
+    for b in range(bodies.body.shape[0]):
         _, _, v, L = read_state(bodies.state, b)
-        report_unresolved_body(v != ZERO or L != ZERO, report, bodies.work[b])
+        report_unresolved_body(v != ZERO or L != ZERO, report, bodies.body[b])

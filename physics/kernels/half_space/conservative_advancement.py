@@ -51,35 +51,35 @@ ACCELERATION_SHARE = 1.0 + 1.0 / math.sqrt(3.0)
 
 
 @inlined
-def max_inv_inertia(work):
+def max_inv_inertia(body):
     """Largest inverse moment of inertia [1/(kg m²)]."""
-    return max(work.J[0], max(work.J[1], work.J[2]))
+    return max(body.J[0], max(body.J[1], body.J[2]))
 
 
 @inlined
-def is_centred(offset_frame, work):
+def is_centred(offset_frame, body):
     """True if the geometric centre is the centre of mass."""
-    return offset_frame is None or (work.center[0] == 0.0 and work.center[1] == 0.0 and work.center[2] == 0.0)
+    return offset_frame is None or (body.center[0] == 0.0 and body.center[1] == 0.0 and body.center[2] == 0.0)
 
 
 @inlined
-def may_turn(L, h, least, offset_frame, work):
+def may_turn(L, h, least, offset_frame, body):
     """True if a body of angular momentum L may turn by more than `least` [rad] in h: a cheap, safe bound.
 
     A sphere whose centre is its centre of mass never counts as turning.
     """
-    if work.shape == SPHERE and is_centred(offset_frame, work):
+    if body.shape == SPHERE and is_centred(offset_frame, body):
         return False
-    s, t = h * max_inv_inertia(work), (work.torque[0], work.torque[1], work.torque[2])
+    s, t = h * max_inv_inertia(body), (body.torque[0], body.torque[1], body.torque[2])
     return 2.0 * (qt.dot(L, L) + h * h * qt.dot(t, t)) * s * s > least * least
 
 
 @kernel
-def spin_bound(q, L, h, offset_frame, work):
+def spin_bound(q, L, h, offset_frame, body):
     """Bound of |ω| within h [rad/s]."""
-    most, least = max_inv_inertia(work), min(work.J[0], min(work.J[1], work.J[2]))
-    w = angular_velocity(q, L, work, offset_frame)
-    push = h * math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
+    most, least = max_inv_inertia(body), min(body.J[0], min(body.J[1], body.J[2]))
+    w = angular_velocity(q, L, body, offset_frame)
+    push = h * math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
     size = max(0.0, math.sqrt(qt.dot(L, L)) - push)
     energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * push
     square = (most + least) * energy * energy - most * least * size * size
@@ -87,30 +87,30 @@ def spin_bound(q, L, h, offset_frame, work):
 
 
 @inlined
-def _arm(i, offset_frame, work):
+def _arm(i, offset_frame, body):
     """Largest distance of a body's points from its principal axis i [m]."""
-    if offset_frame is not None or work.shape == HULL:
-        return work.radius
-    b, c = work.dims[(i + 1) % 3], work.dims[(i + 2) % 3]
+    if offset_frame is not None or body.shape == HULL:
+        return body.radius
+    b, c = body.dims[(i + 1) % 3], body.dims[(i + 2) % 3]
     return math.sqrt(b * b + c * c)
 
 
 @kernel
-def turning_acceleration_bound(spin, q, L, h, offset_frame, work):
+def turning_acceleration_bound(spin, q, L, h, offset_frame, body):
     """Bound of the acceleration of points by turning within h [m/s²], from the bound `spin` of |ω|; 0 if centred."""
-    if work.shape == SPHERE and is_centred(offset_frame, work):
+    if body.shape == SPHERE and is_centred(offset_frame, body):
         return 0.0
-    torque = math.sqrt(work.torque[0] ** 2 + work.torque[1] ** 2 + work.torque[2] ** 2)
-    w, most, J = angular_velocity(q, L, work, offset_frame), max_inv_inertia(work), work.J
+    torque = math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
+    w, most, J = angular_velocity(q, L, body, offset_frame), max_inv_inertia(body), body.J
     size = math.sqrt(qt.dot(L, L)) + h * torque
     energy = math.sqrt(max(0.0, qt.dot(w, L))) + math.sqrt(most) * h * torque
     u = min(math.sqrt(J[0]) * energy, J[0] * size)
     v = min(math.sqrt(J[1]) * energy, J[1] * size)
     t = min(math.sqrt(J[2]) * energy, J[2] * size)
-    a, b, c = _arm(0, offset_frame, work), _arm(1, offset_frame, work), _arm(2, offset_frame, work)
+    a, b, c = _arm(0, offset_frame, body), _arm(1, offset_frame, body), _arm(2, offset_frame, body)
     bend = spin * (u * a + v * b + t * c)
     bend += (v * t + J[0] * torque) * a + (t * u + J[1] * torque) * b + (u * v + J[2] * torque) * c
-    return min(bend, work.radius * (ACCELERATION_SHARE * spin * spin + most * torque))
+    return min(bend, body.radius * (ACCELERATION_SHARE * spin * spin + most * torque))
 
 
 @inlined
@@ -152,42 +152,44 @@ def mean_time(low, high):
 
 
 @inlined
-def _height(t, n, m, gap, rate, bend, c, R, work):
+def _height(t, n, m, gap, rate, bend, c, R, body):
     """Bound of the gap to a wall after t, see the module; c is the geometric centre relative to the centre of mass."""
     k = turned_normal(n, m, t)
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - support_of_vector(work.shape, dims, R, k)
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - support_of_vector(body.shape, dims, R, k)
 
 
 @kernel
-def safe_advance(y, wall, horizon, spin, offset_frame, work):
+def safe_advance(y, wall, horizon, spin, offset_frame, scratch):
     """(gap to a wall, time within which it cannot close in free flight from y, at most `horizon`)."""
+    body = scratch.body
     x, q, v, L = y
-    n, R, w = wall_normal(work.walls, wall), to_matrix(q), angular_velocity(q, L, work, offset_frame)
-    m, d, c, a = qt.cross(n, w), qt.dot(n, x) - work.walls[wall, WALL_OFFSET], (0.0, 0.0, 0.0), work.free_acceleration
+    n, R, w = wall_normal(scratch.scene.walls, wall), to_matrix(q), angular_velocity(q, L, body, offset_frame)
+    m, d = qt.cross(n, w), qt.dot(n, x) - scratch.scene.walls[wall, WALL_OFFSET]
+    c, a = (0.0, 0.0, 0.0), body.free_acceleration
     if offset_frame is not None:
-        c = center_arm(R, work)
+        c = center_arm(R, body)
     rate = qt.dot(n, v)
-    bend = turning_acceleration_bound(spin, q, L, horizon, offset_frame, work) - min(
+    bend = turning_acceleration_bound(spin, q, L, horizon, offset_frame, body) - min(
         0.0, n[0] * a[0] + n[1] * a[1] + n[2] * a[2]
     )
-    gap = _height(0.0, n, m, d, rate, bend, c, R, work)
+    gap = _height(0.0, n, m, d, rate, bend, c, R, body)
     if not gap > 0.0 or not bend > 0.0:
         return gap, horizon
-    low, high = bracket_safe_time(gap, rate, work.radius * math.sqrt(qt.dot(m, m)), bend, horizon)
-    at_low = _height(low, n, m, d, rate, bend, c, R, work)
-    at_high = _height(high, n, m, d, rate, bend, c, R, work)
+    low, high = bracket_safe_time(gap, rate, body.radius * math.sqrt(qt.dot(m, m)), bend, horizon)
+    at_low = _height(low, n, m, d, rate, bend, c, R, body)
+    at_high = _height(high, n, m, d, rate, bend, c, R, body)
     if at_high >= 0.0 or not at_low > 0.0:
         return gap, high if at_high >= 0.0 else low
     for _ in range(CHORDS):
         t = secant_root(low, at_low, high, at_high)
-        found = _height(t, n, m, d, rate, bend, c, R, work)
+        found = _height(t, n, m, d, rate, bend, c, R, body)
         if found > 0.0:
             low, at_low = t, found
         if at_low <= GAP_LEFT_SHARE * gap:
             break
         t = mean_time(low, high)
-        found = _height(t, n, m, d, rate, bend, c, R, work)
+        found = _height(t, n, m, d, rate, bend, c, R, body)
         if found > 0.0:
             low, at_low = t, found
         else:
@@ -196,19 +198,20 @@ def safe_advance(y, wall, horizon, spin, offset_frame, work):
 
 
 @inlined
-def may_reach_wall_in_flight(wall, y, h, work):
+def may_reach_wall_in_flight(wall, y, h, scratch):
     """True if the bounding sphere may touch a wall in a free flight of h."""
-    n, a = wall_normal(work.walls, wall), work.free_acceleration
-    gap = qt.dot(n, y[0]) - work.walls[wall, WALL_OFFSET] - work.radius
+    body = scratch.body
+    n, a = wall_normal(scratch.scene.walls, wall), body.free_acceleration
+    gap = qt.dot(n, y[0]) - scratch.scene.walls[wall, WALL_OFFSET] - body.radius
     gap += min(0.0, h * qt.dot(n, y[2])) + min(0.0, 0.5 * h * h * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
-    return not gap > work.slop
+    return not gap > body.slop
 
 
 @inlined
-def remove_symmetric_spin(R, w, work):
+def remove_symmetric_spin(R, w, body):
     """Angular velocity without the part about axes of symmetry of an ellipsoid, which moves no surface [rad/s]."""
-    d = work.dims
-    if work.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
+    d = body.dims
+    if body.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
         return w
     if d[0] == d[1] and d[1] == d[2]:
         return (0.0, 0.0, 0.0)
@@ -218,49 +221,49 @@ def remove_symmetric_spin(R, w, work):
 
 
 @inlined
-def time_to_turn_far(n, y, offset_frame, work):
+def time_to_turn_far(n, y, offset_frame, body):
     """Time in which a body turns by `FAR_TURN` about axes across n [s]; turning about n brings no point nearer."""
-    w = angular_velocity(y[1], y[3], work, offset_frame)
-    if is_centred(offset_frame, work):
-        w = remove_symmetric_spin(to_matrix(y[1]), w, work)
+    w = angular_velocity(y[1], y[3], body, offset_frame)
+    if is_centred(offset_frame, body):
+        w = remove_symmetric_spin(to_matrix(y[1]), w, body)
     m = qt.cross(n, w)
     rate = math.sqrt(qt.dot(m, m))
     return FAR_TURN / rate if rate > 0.0 else math.inf
 
 
 @inlined
-def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, work):
+def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, scratch):
     """Time of free flight, at most h, after which a wall is at the slop or not reached [s]."""
     now, gone = y, 0.0
     for _ in range(MAX_ADVANCES):
-        gap, step = safe_advance(now, wall, h - gone, spin, offset_frame, work)
-        if not gap > work.slop:
+        gap, step = safe_advance(now, wall, h - gone, spin, offset_frame, scratch)
+        if not gap > scratch.body.slop:
             break
         gone += step
         if not gone < h:
             return h
-        now = fly(now, work, step, gyroscopic, offset_frame)
+        now = fly(now, scratch.body, step, gyroscopic, offset_frame)
     return gone
 
 
 @cold_kernel
-def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, work):
+def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, scratch):
     """Time, at most `left`, that a stage from y may take, so that a body that turns far passes no wall [s].
 
     In contact (n > 0) the free flight of the bound does not apply; then the body turns at most as far as a test at the
     end can judge. The same holds for features on a wall that others touch.
     """
-    spin = spin_bound(y[1], y[3], h, offset_frame, work)
+    spin = spin_bound(y[1], y[3], h, offset_frame, scratch.body)
     if not spin * h > FAR_TURN:
         return left
     first = left
-    for wall in range(work.walls.shape[0]):
-        if not may_reach_wall_in_flight(wall, y, first, work):
+    for wall in range(scratch.scene.walls.shape[0]):
+        if not may_reach_wall_in_flight(wall, y, first, scratch):
             continue
-        normal, met = wall_normal(work.walls, wall), 0.0
-        if work.mask[wall] == 0:
-            met = _fly_near(y, wall, first, spin, gyroscopic, offset_frame, work)
-        limit = time_to_turn_far(normal, y, offset_frame, work)
+        normal, met = wall_normal(scratch.scene.walls, wall), 0.0
+        if scratch.contacts.mask[wall] == 0:
+            met = _fly_near(y, wall, first, spin, gyroscopic, offset_frame, scratch)
+        limit = time_to_turn_far(normal, y, offset_frame, scratch.body)
         if not met > 0.0:
             met = limit
         if n > 0:

@@ -11,15 +11,15 @@ from physics.kernels.state.layout import BLOCK, SPHERE, WALL_NORMAL, WALL_TANGEN
 
 
 @inlined
-def wall_of(slot, work):
+def wall_of(slot, scene):
     """Wall of a contact, by a shift: `features`, 8 or 1, is a power of two, and a division would be too slow."""
-    return slot >> work.feature_bits
+    return slot >> scene.feature_bits
 
 
 @inlined
-def feature_of(slot, work):
+def feature_of(slot, scene):
     """Feature of the body in a contact."""
-    return slot & (work.features - 1)
+    return slot & (scene.features - 1)
 
 
 @inlined
@@ -29,17 +29,17 @@ def wall_normal(walls, k):
 
 
 @inlined
-def center_arm(R, work):
+def center_arm(R, body):
     """Geometric centre of a body relative to its centre of mass, world frame [m]; with `offset_frame` only."""
-    return qt.matvec(R, (work.center[0], work.center[1], work.center[2]))
+    return qt.matvec(R, (body.center[0], body.center[1], body.center[2]))
 
 
 @inlined
-def geometric_center(x, R, work, offset_frame):
+def geometric_center(x, R, body, offset_frame):
     """Geometric centre of a body whose centre of mass is at x [m] (the same unless `offset_frame`)."""
     if offset_frame is None:
         return x
-    r = center_arm(R, work)
+    r = center_arm(R, body)
     return (x[0] + r[0], x[1] + r[1], x[2] + r[2])
 
 
@@ -71,12 +71,12 @@ def ellipsoid_point_and_rate(dims, R, w, n):
 
 
 @inlined
-def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, work):
+def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, body):
     """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature)
         if offset_frame is not None:
-            r = _plus(r, center_arm(R, work))
+            r = _plus(r, center_arm(R, body))
         return r, qt.cross(w, r)
     if shape == SPHERE:
         return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2]), (0.0, 0.0, 0.0)
@@ -84,21 +84,22 @@ def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, work):
 
 
 @inlined
-def place_arms(n, R, offset_frame, work):
-    """Contact points of the set at this pose: `work.arm`, relative to the centre of mass, world frame [m]."""
-    walls, shape = work.walls, work.shape
-    dims = (work.dims[0], work.dims[1], work.dims[2])
+def place_arms(n, R, offset_frame, scratch):
+    """Contact points of the set at this pose: `contacts.arm`, relative to the centre of mass, world frame [m]."""
+    scene, body, contacts = scratch.scene, scratch.body, scratch.contacts
+    walls, shape = scene.walls, body.shape
+    dims = (body.dims[0], body.dims[1], body.dims[2])
     for i in range(n):
-        wall = wall_of(work.slot[i], work)
+        wall = wall_of(contacts.slot[i], scene)
         if shape == BLOCK:
-            r = geo.vertex_arm(dims, R, feature_of(work.slot[i], work))
+            r = geo.vertex_arm(dims, R, feature_of(contacts.slot[i], scene))
             if offset_frame is not None:
-                c = center_arm(R, work)
+                c = center_arm(R, body)
                 r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
         else:
             normal = wall_normal(walls, wall)
             r = geo.support_arm(shape, dims, R, normal, geo.scaled_normal(shape, dims, R, normal))
-        work.arm[i, 0], work.arm[i, 1], work.arm[i, 2] = r
+        contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2] = r
 
 
 @inlined
@@ -118,6 +119,6 @@ def wall_axes(walls, wall):
 
 
 @inlined
-def contact_arm(work, i):
+def contact_arm(contacts, i):
     """Arm of contact i from the centre of mass [m]."""
-    return (work.arm[i, 0], work.arm[i, 1], work.arm[i, 2])
+    return (contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2])

@@ -20,17 +20,17 @@ _stiffness = law_parameter(LAW_STIFFNESS)  # of contact that gives (`compliance`
 
 
 @inlined
-def is_flight_clear(x, v, h, work):
+def is_flight_clear(x, v, h, scratch):
     """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
     The gap of the sphere is a parabola in time. Its lower bound is the start minus the largest losses by velocity and
     by acceleration. A contact can matter only when this is false.
     """
-    walls, a = work.walls, work.free_acceleration
+    walls, a = scratch.scene.walls, scratch.body.free_acceleration
     half = 0.5 * h * h
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - work.radius
+        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - scratch.body.radius
         gap += min(0.0, h * qt.dot(n, v)) + min(0.0, half * (n[0] * a[0] + n[1] * a[1] + n[2] * a[2]))
         if not gap > 0.0:
             return False
@@ -38,7 +38,7 @@ def is_flight_clear(x, v, h, work):
 
 
 @inlined
-def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
+def _admit(gap, speed, slop, reach, soft, slot, h, memory, scratch):
     """True if a feature belongs to the contact set of this stage.
 
     A feature belongs to the set in three cases. It touches (gap <= slop). Or its speed at the wall is at most `soft`,
@@ -48,45 +48,50 @@ def _admit(gap, speed, slop, reach, soft, slot, h, memory, work):
     """
     if gap <= slop or (gap <= SIMULTANEOUS_SLOPS * slop and speed < 0.0):
         return True
-    if speed <= 0.0 and speed * speed + 2.0 * work.acceleration * gap <= soft * soft:
+    if speed <= 0.0 and speed * speed + 2.0 * scratch.body.acceleration * gap <= soft * soft:
         return True
-    return gap + h * speed - reach <= slop and (work.is_last == 1 or last_normal_impulse(slot, memory, work) > 0.0)
+    return gap + h * speed - reach <= slop and (
+        scratch.stage.is_last == 1 or last_normal_impulse(slot, memory, scratch) > 0.0
+    )
 
 
 @inlined
-def _admission_bounds(v, w, h, work):
+def _admission_bounds(v, w, h, scratch):
     """Bounds of `_admit`: way and speed that loads can give a feature, and the largest gap."""
-    slop, acceleration = work.slop, work.acceleration
-    if _stiffness(work) > 0.0:  # springs push where there is no gap left
+    body = scratch.body
+    slop, acceleration = body.slop, body.acceleration
+    if _stiffness(body) > 0.0:  # springs push where there is no gap left
         acceleration = 0.0
     reach, soft = 0.5 * acceleration * h * h, acceleration * h
-    if work.restitution > work.rest_share:  # nor is what would rebound for longer than its share of the step
-        soft *= work.rest_share / work.restitution
+    # Nor is what would rebound for longer than its share of the step.
+    if body.restitution > scratch.settings.rest_share:
+        soft *= scratch.settings.rest_share / body.restitution
     near = max(slop + reach, SIMULTANEOUS_SLOPS * slop)
-    if work.shape == ELLIPSOID:
-        near += 0.5 * h * h * turning_acceleration(w, work)
-    if work.is_last:
-        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + work.radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
+    if body.shape == ELLIPSOID:
+        near += 0.5 * h * h * turning_acceleration(w, body)
+    if scratch.stage.is_last:
+        near += h * (abs(v[0]) + abs(v[1]) + abs(v[2]) + body.radius * (abs(w[0]) + abs(w[1]) + abs(w[2])))
     return reach, soft, near
 
 
 @inlined
-def _write_vertices(d, vn, e, mb, work):
+def _write_vertices(d, vn, e, mb, scratch):
     """Write gap [m] and normal velocity [m/s] of each vertex of a block at one wall, four at a time.
 
     d and vn are those of the centre, e and mb the normal and n x ω in the body frame, e times the half edges.
     """
+    body, contacts = scratch.body, scratch.contacts
     lower, upper = geo.vertex_heights(e)
-    slower, faster = geo.vertex_heights((work.dims[0] * mb[0], work.dims[1] * mb[1], work.dims[2] * mb[2]))
-    store_lanes(work.vertices, 0, 0, d + lower)
-    store_lanes(work.vertices, 0, LANE_COUNT, d + upper)
-    store_lanes(work.vertices, 1, 0, vn + slower)
-    store_lanes(work.vertices, 1, LANE_COUNT, vn + faster)
+    slower, faster = geo.vertex_heights((body.dims[0] * mb[0], body.dims[1] * mb[1], body.dims[2] * mb[2]))
+    store_lanes(contacts.vertices, 0, 0, d + lower)
+    store_lanes(contacts.vertices, 0, LANE_COUNT, d + upper)
+    store_lanes(contacts.vertices, 1, 0, vn + slower)
+    store_lanes(contacts.vertices, 1, LANE_COUNT, vn + faster)
 
 
 @inlined
-def collect_wall_contacts(y, w, h, offset_frame, memory, work):
-    """Fill `work` (slot, gap, speed, mask, and the maxima widest and approach) with the contact set at this pose.
+def collect_wall_contacts(y, w, h, offset_frame, memory, scratch):
+    """Fill `scratch` (slot, gap, speed, mask, and the maxima widest and approach) with the contact set at this pose.
 
     Parameters
     ----------
@@ -104,16 +109,17 @@ def collect_wall_contacts(y, w, h, offset_frame, memory, work):
     depth : float
         Deepest penetration among them [m], 0 if none.
     """
-    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
+    body, contacts = scratch.body, scratch.contacts
+    walls, features, shape, radius = scratch.scene.walls, scratch.scene.features, body.shape, body.radius
     x, q, v, _ = y
-    R, slop = qt.to_matrix(q), work.slop
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    center = geometric_center(x, R, work, offset_frame)
-    reach, soft, near = _admission_bounds(v, w, h, work)
+    R, slop = qt.to_matrix(q), body.slop
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    center = geometric_center(x, R, body, offset_frame)
+    reach, soft, near = _admission_bounds(v, w, h, scratch)
     count = 0
     depth = widest = approach = 0.0
     for k in range(walls.shape[0]):
-        work.mask[k] = 0
+        contacts.mask[k] = 0
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, WALL_OFFSET]
         if d > radius + near:
@@ -125,51 +131,52 @@ def collect_wall_contacts(y, w, h, offset_frame, memory, work):
         m = qt.cross(n, w)  # n·(ω x r) = (n x ω)·r
         if shape == BLOCK:
             if offset_frame is not None:
-                vn += qt.dot(m, center_arm(R, work))
-            _write_vertices(d, vn, e, qt.transposed_matvec(R, m), work)
+                vn += qt.dot(m, center_arm(R, body))
+            _write_vertices(d, vn, e, qt.transposed_matvec(R, m), scratch)
             for vertex in range(VERTEX_COUNT):
-                gap, speed = work.vertices[0, vertex], work.vertices[1, vertex]
+                gap, speed = contacts.vertices[0, vertex], contacts.vertices[1, vertex]
                 if gap > near:
                     continue
-                if _admit(gap, speed, slop, reach, soft, k * features + vertex, h, memory, work):
-                    count = _record(count, k, vertex, features, gap, speed, work)
+                if _admit(gap, speed, slop, reach, soft, k * features + vertex, h, memory, scratch):
+                    count = _record(count, k, vertex, features, gap, speed, contacts)
                     depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
         else:
             gap = d - geo.support(shape, dims, e)
             speed = vn + qt.dot(m, geo.support_arm(shape, dims, R, n, e))
-            if _admit(gap, speed, slop, reach, soft, k, h, memory, work) or is_still_pressed(
-                gap, k, y, h, offset_frame, memory, work
+            if _admit(gap, speed, slop, reach, soft, k, h, memory, scratch) or is_still_pressed(
+                gap, k, y, h, offset_frame, memory, scratch
             ):
-                count = _record(count, k, 0, features, gap, speed, work)
+                count = _record(count, k, 0, features, gap, speed, contacts)
                 depth, widest, approach = max(depth, -gap), max(widest, gap), max(approach, -speed)
-    work.widest, work.approach = widest, approach
+    contacts.widest, contacts.approach = widest, approach
     return count, depth
 
 
 @inlined
-def _record(count, wall, feature, features, gap, speed, work):
-    work.slot[count] = wall * features + feature
-    work.gap[count] = gap
-    work.speed[count] = speed
-    work.mask[wall] |= 1 << feature
+def _record(count, wall, feature, features, gap, speed, contacts):
+    contacts.slot[count] = wall * features + feature
+    contacts.gap[count] = gap
+    contacts.speed[count] = speed
+    contacts.mask[wall] |= 1 << feature
     return count + 1
 
 
 @inlined
-def check_penetration(x, R, offset_frame, work):
+def check_penetration(x, R, offset_frame, scratch):
     """Find features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
 
     After a feature outside the set is found, the other walls are skipped: both results are true then.
     """
-    walls, shape, least = work.walls, work.shape, -0.5 * work.slop
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    center, is_deep = geometric_center(x, R, work, offset_frame), False
+    body = scratch.body
+    walls, shape, least = scratch.scene.walls, body.shape, -0.5 * body.slop
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    center, is_deep = geometric_center(x, R, body, offset_frame), False
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
         d = qt.dot(n, center) - walls[k, WALL_OFFSET]
-        if d > work.radius:
+        if d > body.radius:
             continue
-        e, mask = geo.scaled_normal(shape, dims, R, n), work.mask[k]
+        e, mask = geo.scaled_normal(shape, dims, R, n), scratch.contacts.mask[k]
         gap = d - geo.support(shape, dims, e)
         if gap >= least:
             continue
@@ -179,20 +186,21 @@ def check_penetration(x, R, offset_frame, work):
             for vertex in range(VERTEX_COUNT):
                 if not mask & (1 << vertex) and d + geo.vertex_height(e, vertex) < least:
                     return True, True
-        if gap < -work.slop:
+        if gap < -body.slop:
             is_deep = True
     return False, is_deep
 
 
 @kernel
-def nearest_outside_set(x, R, offset_frame, work):
+def nearest_outside_set(x, R, offset_frame, scratch):
     """Smallest gap [m] over all features outside the contact set, and the slot of its feature.
 
     For a wall out of the bounding sphere's reach the sphere's gap is used: a lower bound, and positive (slot -1).
     """
-    walls, features, shape, radius = work.walls, work.features, work.shape, work.radius
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    center = geometric_center(x, R, work, offset_frame)
+    body = scratch.body
+    walls, features, shape, radius = scratch.scene.walls, scratch.scene.features, body.shape, body.radius
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    center = geometric_center(x, R, body, offset_frame)
     best, slot = 1.0e300, -1
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
@@ -202,7 +210,7 @@ def nearest_outside_set(x, R, offset_frame, work):
                 best, slot = d - radius, -1
             continue
         e = geo.scaled_normal(shape, dims, R, n)
-        mask = work.mask[k]
+        mask = scratch.contacts.mask[k]
         if mask == 0 and not d - geo.support(shape, dims, e) < best:
             continue
         if shape == BLOCK:
@@ -216,44 +224,47 @@ def nearest_outside_set(x, R, offset_frame, work):
 
 
 @kernel
-def feature_gap(slot, x, R, offset_frame, work):
+def feature_gap(slot, x, R, offset_frame, scratch):
     """Gap [m] of one feature to its wall."""
-    walls, shape = work.walls, work.shape
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    n = wall_normal(walls, wall_of(slot, work))
-    d = qt.dot(n, geometric_center(x, R, work, offset_frame)) - walls[wall_of(slot, work), WALL_OFFSET]
+    scene, body = scratch.scene, scratch.body
+    walls, shape = scene.walls, body.shape
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    n = wall_normal(walls, wall_of(slot, scene))
+    d = qt.dot(n, geometric_center(x, R, body, offset_frame)) - walls[wall_of(slot, scene), WALL_OFFSET]
     e = geo.scaled_normal(shape, dims, R, n)
     if shape == BLOCK:
-        return d + geo.vertex_height(e, feature_of(slot, work))
+        return d + geo.vertex_height(e, feature_of(slot, scene))
     return d - geo.support(shape, dims, e)
 
 
 @kernel
-def feature_gap_rate(slot, y, offset_frame, work):
+def feature_gap_rate(slot, y, offset_frame, scratch):
     """Rate of the gap of one feature [m/s]: its normal velocity. A wandering point wanders along the wall."""
+    scene, body = scratch.scene, scratch.body
     _, q, v, L = y
-    walls, R, shape = work.walls, qt.to_matrix(q), work.shape
-    dims = (work.dims[0], work.dims[1], work.dims[2])
-    n = wall_normal(walls, wall_of(slot, work))
+    walls, R, shape = scene.walls, qt.to_matrix(q), body.shape
+    dims = (body.dims[0], body.dims[1], body.dims[2])
+    n = wall_normal(walls, wall_of(slot, scene))
     if shape == BLOCK:
-        r = geo.vertex_arm(dims, R, feature_of(slot, work))
+        r = geo.vertex_arm(dims, R, feature_of(slot, scene))
         if offset_frame is not None:
-            c = center_arm(R, work)
+            c = center_arm(R, body)
             r = (r[0] + c[0], r[1] + c[1], r[2] + c[2])
     else:
         r = geo.support_arm(shape, dims, R, n, geo.scaled_normal(shape, dims, R, n))
-    u = qt.cross(angular_velocity(q, L, work, offset_frame), r)
+    u = qt.cross(angular_velocity(q, L, body, offset_frame), r)
     return qt.dot(n, (v[0] + u[0], v[1] + u[1], v[2] + u[2]))
 
 
 @inlined
-def project_out_of_walls(x, R, offset_frame, work):
+def project_out_of_walls(x, R, offset_frame, scratch):
     """Position moved along the normals until no point is deeper than the slop in a wall. No velocity changes."""
-    walls, shape, radius, slop = work.walls, work.shape, work.radius, work.slop
-    dims = (work.dims[0], work.dims[1], work.dims[2])
+    body = scratch.body
+    walls, shape, radius, slop = scratch.scene.walls, body.shape, body.radius, body.slop
+    dims = (body.dims[0], body.dims[1], body.dims[2])
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        d = qt.dot(n, geometric_center(x, R, work, offset_frame)) - walls[k, WALL_OFFSET]
+        d = qt.dot(n, geometric_center(x, R, body, offset_frame)) - walls[k, WALL_OFFSET]
         if d >= radius:
             continue
         gap = d - geo.support(shape, dims, geo.scaled_normal(shape, dims, R, n))

@@ -27,7 +27,7 @@ def _size(a):
 
 
 @inlined
-def count_clear_substeps(x, v, h, left, work):
+def count_clear_substeps(x, v, h, left, scratch):
     """Number of substeps of h, of `left`, in which free flight from x with velocity v meets no wall; 0 if unknown.
 
     The first is `is_flight_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it
@@ -35,16 +35,17 @@ def count_clear_substeps(x, v, h, left, work):
     before, loses at most s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for rounding, and
     for textbook schemes, which go up to c t h/2 further: to leave out looks changes nothing.
     """
-    if not is_flight_clear(x, v, h, work):
+    body = scratch.body
+    if not is_flight_clear(x, v, h, scratch):
         return 0
-    if left < _MIN_SUBSTEPS or has_fields(work):
+    if left < _MIN_SUBSTEPS or has_fields(body):
         return 1
-    walls, a = work.walls, (work.free_acceleration[0], work.free_acceleration[1], work.free_acceleration[2])
+    walls, a = scratch.scene.walls, (body.free_acceleration[0], body.free_acceleration[1], body.free_acceleration[2])
     size, t, first = _size(x), h * min(left, _MAX_SUBSTEPS), _MIN_SUBSTEPS * h
     nearest = _FAR
     for k in range(walls.shape[0]):
         n = wall_normal(walls, k)
-        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - work.radius
+        gap = qt.dot(n, x) - walls[k, WALL_OFFSET] - body.radius
         way, s, c = 0.5 * gap, max(0.0, -qt.dot(n, v)), max(0.0, -qt.dot(n, a))
         if first * (s + 0.5 * first * c) > way:
             return 1

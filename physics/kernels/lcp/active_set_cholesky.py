@@ -1,6 +1,6 @@
 """Cholesky factor of the clamped rows and columns of a matrix, updated as indices are added and removed.
 
-`work` holds the factor in its first n rows and the matrix, with a diagonal scaled
+`floats` holds the factor in its first n rows and the matrix, with a diagonal scaled
 to [1/4, 1), in the next n. `index` holds the clamped indices in the order of the
 factor, then for every index its place there, negative if it is not clamped.
 An index joins by a new row of the factor; where one leaves, the rows behind it
@@ -17,12 +17,12 @@ DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur
 
 
 @kernel
-def clamp_index(work, index, n, count, k):
+def clamp_index(floats, index, n, count, k):
     """Append index k to the `count` clamped ones: one row of the Cholesky factor.
 
     Returns whether k is independent of them; if not, nothing but scratch space has changed.
     """
-    factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
+    factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
     schur = A[k, k]
     for r in range(count):
         entry = A[k, clamped[r]]
@@ -40,7 +40,7 @@ def clamp_index(work, index, n, count, k):
 
 
 @kernel
-def release_index(work, index, n, count, k):
+def release_index(floats, index, n, count, k):
     """Remove index k from the clamped ones and rebuild the factor behind it. Returns the new count."""
     clamped = index[:n]
     place = index[n + k]
@@ -49,7 +49,7 @@ def release_index(work, index, n, count, k):
     for r in range(place + 1, count):
         j = clamped[r]
         index[n + j] = -1
-        if clamp_index(work, index, n, kept, j):
+        if clamp_index(floats, index, n, kept, j):
             kept += 1
     return kept
 

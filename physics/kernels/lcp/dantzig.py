@@ -52,20 +52,20 @@ DIRECTION_TOLERANCE = 2.0**-44  # of the largest rate: what moves slower stands 
 _TIE_TOLERANCE = 2.0**-42  # of 1 + max z: a driven w above minus this has reached zero
 SIGN_TOLERANCE = 2.0**-40  # of 1 + max z: a w above minus this counts as >= 0
 
-# Rows of `work` after the factor (n rows) and the scaled matrix (n rows).
+# Rows of `floats` after the factor (n rows) and the scaled matrix (n rows).
 SCALE, RHS, W, RATE_Z, RATE_W, SCRATCH = range(6)
 
 
 def dantzig_sizes(n: int) -> tuple[tuple[int, int], int]:
-    """Shape of `work` (float64) and length of `index` (int64) for a problem of size n."""
+    """Shape of `floats` (float64) and length of `index` (int64) for a problem of size n."""
     return (2 * n + 6, n), 2 * n
 
 
 @kernel
-def scale_problem(M, q, work):
-    """Write scaled matrix and q into `work`; return the scales of M (0 if its diagonal is not >= 0) and q."""
+def scale_problem(M, q, floats):
+    """Write scaled matrix and q into `floats`; return the scales of M (0 if its diagonal is not >= 0) and q."""
     n = q.shape[0]
-    A, scale, rhs = work[n : 2 * n], work[2 * n + SCALE], work[2 * n + RHS]
+    A, scale, rhs = floats[n : 2 * n], floats[2 * n + SCALE], floats[2 * n + RHS]
     largest = 0.0
     for i in range(n):
         if M[i, i] < 0.0:
@@ -87,13 +87,13 @@ def scale_problem(M, q, work):
 
 
 @kernel
-def find_rates(work, index, n, count, i):
+def find_rates(floats, index, n, count, i):
     """Rates of z and w while z_i grows at rate 1 and the clamped w stay zero.
 
     Returns (largest rate, whether i is independent of the clamped ones).
     """
-    factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
-    rate_z, rate_w, x = work[2 * n + RATE_Z], work[2 * n + RATE_W], work[2 * n + SCRATCH]
+    factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
+    rate_z, rate_w, x = floats[2 * n + RATE_Z], floats[2 * n + RATE_W], floats[2 * n + SCRATCH]
     for r in range(count):
         x[r] = -A[i, clamped[r]]
     solve_clamped(factor, count, x)
@@ -111,13 +111,13 @@ def find_rates(work, index, n, count, i):
 
 
 @kernel
-def find_block(work, index, z, n, i, largest, is_independent):
+def find_block(floats, index, z, n, i, largest, is_independent):
     """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks.
 
     If w_i is zero within rounding as well, i comes first, which ends the drive. Otherwise i would depend on the clamped
     indices, and rounding would decide the next pivot.
     """
-    w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
+    w, rate_z, rate_w = floats[2 * n + W], floats[2 * n + RATE_Z], floats[2 * n + RATE_W]
     threshold = DIRECTION_TOLERANCE * largest
     step = math.inf
     blocking = -1
@@ -145,12 +145,12 @@ def find_block(work, index, z, n, i, largest, is_independent):
 
 
 @kernel
-def drive_to_zero(work, index, z, n, count, i, budget):
+def drive_to_zero(floats, index, z, n, count, i, budget):
     """Increase z_i until w_i = 0. Returns (status, pivots, new clamped count)."""
-    w, rate_z, rate_w = work[2 * n + W], work[2 * n + RATE_Z], work[2 * n + RATE_W]
+    w, rate_z, rate_w = floats[2 * n + W], floats[2 * n + RATE_Z], floats[2 * n + RATE_W]
     for pivots in range(budget):
-        largest, is_independent = find_rates(work, index, n, count, i)
-        blocking, step = find_block(work, index, z, n, i, largest, is_independent)
+        largest, is_independent = find_rates(floats, index, n, count, i)
+        blocking, step = find_block(floats, index, z, n, i, largest, is_independent)
         if blocking < 0:
             return LCP_RAY, pivots, count
         z[i] += step
@@ -165,10 +165,10 @@ def drive_to_zero(work, index, z, n, count, i, budget):
         if index[n + blocking] >= 0:
             z[blocking] = 0.0
             w[blocking] = 0.0
-            count = release_index(work, index, n, count, blocking)
+            count = release_index(floats, index, n, count, blocking)
             continue
         w[blocking] = 0.0
-        if clamp_index(work, index, n, count, blocking):
+        if clamp_index(floats, index, n, count, blocking):
             count += 1
         else:
             index[n + blocking] = -2
@@ -178,10 +178,10 @@ def drive_to_zero(work, index, z, n, count, i, budget):
 
 
 @kernel
-def recompute(work, index, z, n, count):
+def recompute(floats, index, z, n, count):
     """Recompute z of the clamped indices from the factor, refined once, others 0; and w = M z + q."""
-    factor, A, clamped = work[:n], work[n : 2 * n], index[:n]
-    rhs, w, x = work[2 * n + RHS], work[2 * n + W], work[2 * n + SCRATCH]
+    factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
+    rhs, w, x = floats[2 * n + RHS], floats[2 * n + W], floats[2 * n + SCRATCH]
     for k in range(n):
         z[k] = 0.0
         w[k] = rhs[k]
@@ -208,25 +208,25 @@ def recompute(work, index, z, n, count):
 
 
 @kernel
-def drive_all(work, index, z, n, max_pivots):
+def drive_all(floats, index, z, n, max_pivots):
     """Drive the first index with w < 0 until none is left. Returns (status, pivots)."""
     count = 0
     pivots = 0
     while True:
-        recompute(work, index, z, n, count)
+        recompute(floats, index, z, n, count)
         i = 0
-        while i < n and not work[2 * n + W, i] < 0.0:
+        while i < n and not floats[2 * n + W, i] < 0.0:
             i += 1
         if i == n:
             return LCP_SOLVED, pivots
-        status, done, count = drive_to_zero(work, index, z, n, count, i, max_pivots - pivots)
+        status, done, count = drive_to_zero(floats, index, z, n, count, i, max_pivots - pivots)
         pivots += done
         if status != LCP_SOLVED:
             return status, pivots
 
 
 @kernel
-def dantzig(M, q, z, work, index, max_pivots):
+def dantzig(M, q, z, floats, index, max_pivots):
     """Solve w = M z + q, w >= 0, z >= 0, z·w = 0 for symmetric positive semidefinite M.
 
     Parameters
@@ -240,9 +240,9 @@ def dantzig(M, q, z, work, index, max_pivots):
         The solution if the status is `LCP_SOLVED`; the best found if it is
         `INACCURATE`; zeros otherwise. With dependent rows of M one of many
         solutions (w is the same for all): positive on independent rows only.
-    work : (2 n + 6, n) float64, work
+    floats : (2 n + 6, n) float64, scratch
         Cholesky factor, scaled matrix, six vectors.
-    index : (2 n,) int64, work
+    index : (2 n,) int64, scratch
         Clamped indices in the order of the factor, place of each index there or -1.
     max_pivots : int
         Changes of the clamped set to do at most.
@@ -264,17 +264,17 @@ def dantzig(M, q, z, work, index, max_pivots):
     z[:n] = 0.0
     if not are_finite(M, q):
         return LCP_BAD_DATA, 0
-    whole, q_scale = scale_problem(M, q, work)
+    whole, q_scale = scale_problem(M, q, floats)
     if whole == 0.0:
         return LCP_BAD_DATA, 0
     index[n : 2 * n] = -1
-    status, pivots = drive_all(work, index, z, n, max_pivots)
+    status, pivots = drive_all(floats, index, z, n, max_pivots)
     if status != LCP_SOLVED:
         z[:n] = 0.0
         return status, pivots
-    ones = work[2 * n + SCRATCH]
+    ones = floats[2 * n + SCRATCH]
     ones[:] = 1.0
-    status = certify_solution(work[n : 2 * n], work[2 * n + RHS], z, ones, ones, 1.0)
+    status = certify_solution(floats[n : 2 * n], floats[2 * n + RHS], z, ones, ones, 1.0)
     for j in range(n):
-        z[j] *= work[2 * n + SCALE, j] * (whole / q_scale)
+        z[j] *= floats[2 * n + SCALE, j] * (whole / q_scale)
     return status, pivots

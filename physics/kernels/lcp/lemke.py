@@ -252,9 +252,9 @@ def lemke(M, q, z, tableau, basis, max_pivots):
     z : (n,) float64, out
         The solution if the status is `LCP_SOLVED`; the best found if it is
         `INACCURATE`; zeros otherwise.
-    tableau : (n + 3, n + 2) float64, work
+    tableau : (n + 3, n + 2) float64, scratch
         Tableau, then one row each of row scales, column scales and defects.
-    basis : (5 n + 2,) int64, work
+    basis : (5 n + 2,) int64, scratch
         Variable of each row (n), variable of each column (n + 1), place of
         each variable (2 n + 1: row, or -1 - column), tied rows (n). Variables
         are numbered w_0 .. w_{n-1}, z_0 .. z_{n-1}, z0.

@@ -81,7 +81,7 @@ def stop_workers(crew):
 
 @inlined
 def _rest(crew, look):
-    """Pause after so many polls; the leader may need this processor for its own work."""
+    """Pause after so many polls; the leader may need this processor itself."""
     spin_pause()
     if look % crew[0, CREW_YIELD_INTERVAL] == 0 or (
         look == crew[0, CREW_BRIEF_PAUSES] and atomic_load(crew, 0, CREW_LEADER_DONE) == 0

@@ -22,37 +22,37 @@ def _gravity_of(world, bodies):
 
 
 @inlined
-def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, work):
-    """Write parameters of body i, and the loads held over the step, into `work`.
+def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, body):
+    """Write parameters of body i, and the loads held over the step, into `body`.
 
     gravity, friction, restitution and offset_frame are None if the scene does not have them. offset_frame is None if
     the principal axes of every body are its body axes, and its geometric centre is its centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
     gravity = _gravity_of(world, bodies)
-    work.i, work.world, work.shape = i, world, shape
-    work.mass, work.radius, work.slop = 1.0 / inv_mass, radius, work.relative_slop * radius
+    body.i, body.world, body.shape = i, world, shape
+    body.mass, body.radius, body.slop = 1.0 / inv_mass, radius, body.relative_slop * radius
     for c in range(3):
-        work.J[c] = bodies.params[i, at.INV_INERTIA + c]
-        work.dims[c] = bodies.params[i, at.DIMENSIONS + c]
-        work.free_acceleration[c] = gravity[c] + inv_mass * bodies.wrench[i, c]
-        work.torque[c] = bodies.wrench[i, 3 + c]
+        body.J[c] = bodies.params[i, at.INV_INERTIA + c]
+        body.dims[c] = bodies.params[i, at.DIMENSIONS + c]
+        body.free_acceleration[c] = gravity[c] + inv_mass * bodies.wrench[i, c]
+        body.torque[c] = bodies.wrench[i, 3 + c]
     for c in range(SERIES_SIZE):
-        work.series[c] = bodies.params[i, at.SERIES + c]
-    work.mu = work.restitution = 0.0
+        body.series[c] = bodies.params[i, at.SERIES + c]
+    body.mu = body.restitution = 0.0
     if friction is not None:
-        work.mu = bodies.params[i, at.FRICTION]
+        body.mu = bodies.params[i, at.FRICTION]
     if restitution is not None:
-        work.restitution = bodies.params[i, at.RESTITUTION]
+        body.restitution = bodies.params[i, at.RESTITUTION]
     if offset_frame is not None:
         for c in range(4):
-            work.principal[c] = bodies.params[i, at.PRINCIPAL + c]
+            body.principal[c] = bodies.params[i, at.PRINCIPAL + c]
         for c in range(3):
-            work.center[c] = bodies.params[i, at.CENTER + c]
-    a, t, J = work.free_acceleration, work.torque, work.J
-    work.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+            body.center[c] = bodies.params[i, at.CENTER + c]
+    a, t, J = body.free_acceleration, body.torque, body.J
+    body.acceleration = math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     turning = max(J[0], J[1], J[2]) * math.sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2])
-    work.acceleration += radius * turning
+    body.acceleration += radius * turning
 
 
 @inlined
@@ -100,9 +100,9 @@ def find_nonfinite_body(now):
 
 
 @inlined
-def has_finite_loads(work):
+def has_finite_loads(body):
     """True if the loads found by `bind_body` are finite and far from overflow (`layout.OVERFLOW_LIMIT`)."""
-    return work.acceleration <= at.OVERFLOW_LIMIT
+    return body.acceleration <= at.OVERFLOW_LIMIT
 
 
 @inlined
@@ -130,28 +130,28 @@ def report_fault(world, b, report):
 
 
 @inlined
-def principal_attitude(q, work, offset_frame):
+def principal_attitude(q, body, offset_frame):
     """Quaternion of the principal frame, from that of the body frame (equal unless `offset_frame`)."""
     if offset_frame is None:
         return q
-    p = work.principal
+    p = body.principal
     return qt.multiply(q, (p[0], p[1], p[2], p[3]))
 
 
 @inlined
-def principal_matrix(q, R, work, offset_frame):
+def principal_matrix(q, R, body, offset_frame):
     """Matrix of `principal_attitude`, from the matrix R of the body frame (equal unless `offset_frame`)."""
     if offset_frame is None:
         return R
-    return qt.to_matrix(principal_attitude(q, work, offset_frame))
+    return qt.to_matrix(principal_attitude(q, body, offset_frame))
 
 
 @inlined
-def body_attitude(q, work, offset_frame):
+def body_attitude(q, body, offset_frame):
     """Quaternion of the body frame, from that of the principal frame."""
     if offset_frame is None:
         return q
-    p = work.principal
+    p = body.principal
     return qt.multiply(q, (p[0], -p[1], -p[2], -p[3]))
 
 
@@ -163,17 +163,17 @@ def apply_inv_inertia(R, L, J):
 
 
 @kernel
-def angular_velocity(q, L, work, offset_frame):
+def angular_velocity(q, L, body, offset_frame):
     """`apply_inv_inertia` of a body with attitude q."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
-    return apply_inv_inertia(qt.to_matrix(principal_attitude(q, work, offset_frame)), L, work.J)
+    return apply_inv_inertia(qt.to_matrix(principal_attitude(q, body, offset_frame)), L, body.J)
 
 
 @inlined
-def kinetic_energy(q, v, L, work, offset_frame):
+def kinetic_energy(q, v, L, body, offset_frame):
     """Kinetic energy of one body [J]."""
-    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, work, offset_frame)))
+    return 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
 
 
 @inlined

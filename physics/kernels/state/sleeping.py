@@ -88,11 +88,11 @@ def _way_from_start(i, y, radius, rows):
 
 
 @inlined
-def _fastest_point(y, work):
+def _fastest_point(y, body):
     """Bound of the speed of any point of the body [m/s]: |v| + r |ω|, |ω| <= |L| over the least moment."""
     _, _, v, L = y
-    spin = max(work.J[0], work.J[1], work.J[2]) * (abs(L[0]) + abs(L[1]) + abs(L[2]))
-    return abs(v[0]) + abs(v[1]) + abs(v[2]) + work.radius * spin
+    spin = max(body.J[0], body.J[1], body.J[2]) * (abs(L[0]) + abs(L[1]) + abs(L[2]))
+    return abs(v[0]) + abs(v[1]) + abs(v[2]) + body.radius * spin
 
 
 @inlined
@@ -107,30 +107,30 @@ def _begin(i, y, rows):
 
 
 @inlined
-def _is_over(clock, work, sleep):
+def _is_over(clock, body, sleep):
     """True if a window of this length is over: √(2 r/a) is the time to fall r at a."""
     if sleep.time > 0.0:
         return clock >= sleep.time
-    return clock * clock * work.acceleration >= 2.0 * work.radius
+    return clock * clock * body.acceleration >= 2.0 * body.radius
 
 
 @kernel
-def update_sleep_window(i, y, h, work, sleep):
+def update_sleep_window(i, y, h, body, sleep):
     """Record the place of body i after a substep of h; return whether the last of enough quiet windows has ended."""
     rows = sleep.rows
     if rows[i, SLEEP_CLOCK] == 0.0:
         _begin(i, y, rows)
     rows[i, SLEEP_CLOCK] += h
-    way = max(_way_from_start(i, y, work.radius, rows), h * _fastest_point(y, work))
+    way = max(_way_from_start(i, y, body.radius, rows), h * _fastest_point(y, body))
     rows[i, WINDOW_DISPLACEMENT] = max(rows[i, WINDOW_DISPLACEMENT], way)
-    if not rows[i, WINDOW_DISPLACEMENT] <= sleep.way * work.radius:
+    if not rows[i, WINDOW_DISPLACEMENT] <= sleep.way * body.radius:
         rows[i, SLEEP_CLOCK] = rows[i, QUIET_WINDOWS] = 0.0
         return False
-    if not _is_over(rows[i, SLEEP_CLOCK], work, sleep):
+    if not _is_over(rows[i, SLEEP_CLOCK], body, sleep):
         return False
     rows[i, EARLIER_DISPLACEMENT], rows[i, LAST_DISPLACEMENT] = (
         rows[i, LAST_DISPLACEMENT],
-        rows[i, WINDOW_DISPLACEMENT] / work.radius,
+        rows[i, WINDOW_DISPLACEMENT] / body.radius,
     )
     rows[i, QUIET_WINDOWS] += 1.0
     rows[i, SLEEP_CLOCK] = 0.0
@@ -158,9 +158,9 @@ def remains_asleep(i, wrench, sleep):
 
 
 @inlined
-def falls_asleep(i, y, h, work, sleep):
+def falls_asleep(i, y, h, body, sleep):
     """Do `update_sleep_window` for body i, which meets walls only; return whether it falls asleep now."""
-    if update_sleep_window(i, y, h, work, sleep) and not is_motion_growing(
+    if update_sleep_window(i, y, h, body, sleep) and not is_motion_growing(
         sleep.rows[i, LAST_DISPLACEMENT], sleep.rows[i, EARLIER_DISPLACEMENT]
     ):
         sleep.rows[i, SLEEP_GROUP] = i + 1.0

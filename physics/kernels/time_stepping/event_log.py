@@ -103,24 +103,25 @@ def note_impact(log, counts, i, t, wall, other, impulse, sums):
 
 
 @kernel
-def log_wall_impacts(n, width, x, least, t, work, log, counts):
-    """One event per wall with the sum of the impulses of its contacts in `work`, if that is more than `least` [N s].
+def log_wall_impacts(n, width, x, least, t, scratch, log, counts):
+    """One event per wall with the sum of the impulses of its contacts in `scratch`, if that is more than `least` [N s].
 
     `width` is the number of impulses of a contact, 1 without friction and 3 with it; x where the body is [m].
     """
-    walls = work.walls
+    contacts = scratch.contacts
+    walls = scratch.scene.walls
     for wall in range(walls.shape[0]):
         px = py = pz = 0.0
         sums = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
         for i in range(n):
-            if wall_of(work.slot[i], work) == wall:
+            if wall_of(contacts.slot[i], scratch.scene) == wall:
                 for c in range(width):
-                    s = work.impulse[width * i + c]
+                    s = contacts.impulse[width * i + c]
                     px += s * walls[wall, 3 * c]
                     py += s * walls[wall, 3 * c + 1]
                     pz += s * walls[wall, 3 * c + 2]
-                point = (x[0] + work.arm[i, 0], x[1] + work.arm[i, 1], x[2] + work.arm[i, 2])
+                point = (x[0] + contacts.arm[i, 0], x[1] + contacts.arm[i, 1], x[2] + contacts.arm[i, 2])
                 normal = (walls[wall, 0], walls[wall, 1], walls[wall, 2])
-                sums = add_weighted_contact(sums, normal, work.impulse[width * i], point)
+                sums = add_weighted_contact(sums, normal, contacts.impulse[width * i], point)
         if px * px + py * py + pz * pz > least * least:
-            note_impact(log, counts, work.i, t, wall, NOBODY, (px, py, pz), sums)
+            note_impact(log, counts, scratch.body.i, t, wall, NOBODY, (px, py, pz), sums)

@@ -33,10 +33,10 @@ _SLIP_MARGIN = 2.0
 
 
 @inlined
-def _tangential(i, v, w, work):
+def _tangential(i, v, w, scratch):
     """Tangential velocity of the body at contact i [m/s]."""
-    walls, k = work.walls, wall_of(work.slot[i], work)
-    m = qt.cross(w, contact_arm(work, i))
+    walls, k = scratch.scene.walls, wall_of(scratch.contacts.slot[i], scratch.scene)
+    m = qt.cross(w, contact_arm(scratch.contacts, i))
     x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
     t = WALL_TANGENT_1
     return (
@@ -46,22 +46,23 @@ def _tangential(i, v, w, work):
 
 
 @inlined
-def _least_slip(w, h, work):
+def _least_slip(w, h, scratch):
     """Slip at the start of a stage up to which a contact holds [m/s].
 
     The limit is the error of a sticking contact's target (`target_velocity.set_resting_targets`) in the stage before.
     It is the tolerance of its solve plus h² (ω α + ω³ r); for a sphere, whose arm does not turn with it, the tolerance
     alone.
     """
-    least = work.tolerance * work.acceleration * h
-    if work.shape == SPHERE:
+    body = scratch.body
+    least = scratch.settings.tolerance * body.acceleration * h
+    if body.shape == SPHERE:
         return least
     square = qt.dot(w, w)
-    return least + _SLIP_MARGIN * h * math.sqrt(square) * h * (work.acceleration + work.radius * square)
+    return least + _SLIP_MARGIN * h * math.sqrt(square) * h * (body.acceleration + body.radius * square)
 
 
 @if_given("contact.friction", False)
-def oppose_mean_slip(n, contact, v, w, h, work):
+def oppose_mean_slip(n, contact, v, w, h, scratch):
     """Let friction oppose the mean slip of the stage; return whether all contacts slip.
 
     Parameters
@@ -73,48 +74,50 @@ def oppose_mean_slip(n, contact, v, w, h, work):
 
     Notes
     -----
-    Changes the tangents of `work.target`, which `target_velocity.set_resting_targets` has set: what the turning of its
-    arm takes from a contact in half a stage (kept in `work.held_target`). Added to the velocity at the middle it gives
-    the one at the start.
+    Changes the tangents of `contacts.target`, which `target_velocity.set_resting_targets` has set: what the turning of
+    its arm takes from a contact in half a stage (kept in `contacts.held_target`). Added to the velocity at the middle
+    it gives the one at the start.
     """
-    least = _least_slip(w, h, work)
+    contacts = scratch.contacts
+    least = _least_slip(w, h, scratch)
     for i in range(n):
-        a, b = _tangential(i, v, w, work)
-        a, b = a + work.target[i, 1], b + work.target[i, 2]
+        a, b = _tangential(i, v, w, scratch)
+        a, b = a + contacts.target[i, 1], b + contacts.target[i, 2]
         if not a * a + b * b > least * least:
             return False
     for i in range(n):
-        a, b = _tangential(i, v, w, work)
-        work.held_target[i, 0], work.held_target[i, 1] = work.target[i, 1], work.target[i, 2]
-        work.target[i, 1], work.target[i, 2] = -a, -b
+        a, b = _tangential(i, v, w, scratch)
+        contacts.held_target[i, 0], contacts.held_target[i, 1] = contacts.target[i, 1], contacts.target[i, 2]
+        contacts.target[i, 1], contacts.target[i, 2] = -a, -b
     return True
 
 
 @inlined
-def oppose_end_slip(n, work):
+def oppose_end_slip(n, contacts):
     """Undo `oppose_mean_slip`."""
     for i in range(n):
-        work.target[i, 1], work.target[i, 2] = work.held_target[i, 0], work.held_target[i, 1]
+        contacts.target[i, 1], contacts.target[i, 2] = contacts.held_target[i, 0], contacts.held_target[i, 1]
 
 
 @inlined
-def has_slip_reversed(n, v, w, work):
-    """True if the slip of a pushing contact opposes the earlier slip, -`work.target`, after impulses."""
-    ratio = friction_ratio(work)
+def has_slip_reversed(n, v, w, scratch):
+    """True if the slip of a pushing contact opposes the earlier slip, -`contacts.target`, after impulses."""
+    contacts = scratch.contacts
+    ratio = friction_ratio(scratch.body)
     for i in range(n):
-        a, b = _tangential(i, v, w, work)
+        a, b = _tangential(i, v, w, scratch)
         b *= ratio * ratio  # both slips stretched (`anisotropic_friction`)
-        if work.impulse[3 * i] > 0.0 and a * work.target[i, 1] + b * work.target[i, 2] > 0.0:
+        if contacts.impulse[3 * i] > 0.0 and a * contacts.target[i, 1] + b * contacts.target[i, 2] > 0.0:
             return True
     return False
 
 
-def _as_solved(n, contact, v, w, solved, free, R, h, work):
+def _as_solved(n, contact, v, w, solved, free, R, h, scratch):
     return solved
 
 
 @if_law((LAW_STIFFNESS,), _as_solved)
-def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
+def cap_friction_work(n, contact, v, w, solved, free, R, h, scratch):
     """Result of `solve_contacts` for `free` (v, L), with friction against the mean slip if it created energy.
 
     An impulse p adds the energy p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰. In a rigid impact the normal
@@ -125,18 +128,19 @@ def cap_friction_work(n, contact, v, w, solved, free, R, h, work):
     v, w : tuples of 3 floats
         Velocity and angular velocity before the stage, at the attitude R of its middle.
     """
+    body, contacts = scratch.body, scratch.contacts
     if not has_friction(contact):
         return solved
-    w_new = apply_inv_inertia(R, solved[1], work.J)
+    w_new = apply_inv_inertia(R, solved[1], body.J)
     gift = push = 0.0
     for i in range(n):
-        a, b = _tangential(i, v, w, work)
-        c, d = _tangential(i, solved[0], w_new, work)
-        gift += 0.5 * (work.impulse[3 * i + 1] * (a + c) + work.impulse[3 * i + 2] * (b + d))
-        push += work.impulse[3 * i]
-    if not gift > (1.0 + work.mu) * push * work.tolerance * work.acceleration * h:
+        a, b = _tangential(i, v, w, scratch)
+        c, d = _tangential(i, solved[0], w_new, scratch)
+        gift += 0.5 * (contacts.impulse[3 * i + 1] * (a + c) + contacts.impulse[3 * i + 2] * (b + d))
+        push += contacts.impulse[3 * i]
+    if not gift > (1.0 + body.mu) * push * scratch.settings.tolerance * body.acceleration * h:
         return solved
     for i in range(n):
-        a, b = _tangential(i, v, w, work)
-        work.target[i, 1], work.target[i, 2] = -a, -b
-    return solve_contacts(n, contact, free[0], free[1], R, work)
+        a, b = _tangential(i, v, w, scratch)
+        contacts.target[i, 1], contacts.target[i, 2] = -a, -b
+    return solve_contacts(n, contact, free[0], free[1], R, scratch)

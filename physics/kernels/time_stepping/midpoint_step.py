@@ -41,14 +41,14 @@ TARGET_ERROR_SLOP_SHARE = 0.01
 
 
 @inlined
-def rest_residual(h, work):
+def rest_residual(h, scratch):
     """Largest residual of a resting stage of length h, whatever the tolerance allows [m/s].
 
     A residual of ε a h lets a body drift by ε a h² per step. Strong loads make this more than a slop, and a body
     pressed against a wall would creep. Then the residual is limited so that the drift is a small part of a slop.
     """
-    slop_speed = work.slop / h
-    if work.tolerance * work.acceleration * h > slop_speed:
+    slop_speed = scratch.body.slop / h
+    if scratch.settings.tolerance * scratch.body.acceleration * h > slop_speed:
         return CREEP_SLOP_SHARE * slop_speed
     return math.inf
 
@@ -65,45 +65,46 @@ def _gyroscopic_acceleration(flight, R, m, wb, J):
 
 
 @inlined
-def midpoint_step(n, y, h, contact, flight, records, work):
+def midpoint_step(n, y, h, contact, flight, records, scratch):
     """State after Moreau's midpoint step over h with the n contacts of the set."""
+    body, stage, contacts = scratch.body, scratch.stage, scratch.contacts
     x, q, v, L = y
-    a, torque = work.free_acceleration, work.torque
-    before, after = split_stage_by_theta(n, y, h, flight.offset_frame, work)
+    a, torque = body.free_acceleration, body.torque
+    before, after = split_stage_by_theta(n, y, h, flight.offset_frame, scratch)
     x = (x[0] + before * v[0], x[1] + before * v[1], x[2] + before * v[2])
-    q = drift_attitude(q, L, work, before, flight.gyroscopic, flight.offset_frame)
+    q = drift_attitude(q, L, body, before, flight.gyroscopic, flight.offset_frame)
     middle = qt.to_matrix(q)
-    place_arms(n, middle, flight.offset_frame, work)
-    R = principal_matrix(q, middle, work, flight.offset_frame)
+    place_arms(n, middle, flight.offset_frame, scratch)
+    R = principal_matrix(q, middle, body, flight.offset_frame)
     w, alpha = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if L[0] != 0.0 or L[1] != 0.0 or L[2] != 0.0:
-        m, J = qt.transposed_matvec(R, L), work.J
+        m, J = qt.transposed_matvec(R, L), body.J
         wb = (J[0] * m[0], J[1] * m[1], J[2] * m[2])
         w = qt.matvec(R, wb)
         alpha = _gyroscopic_acceleration(flight, R, m, wb, J)
     motion = StageMotion(middle, v, w, alpha)
-    set_resting_targets(n, motion, h, flight.offset_frame, work)
-    set_spring_targets(n, x, motion, before, after, flight.offset_frame, work)
+    set_resting_targets(n, motion, h, flight.offset_frame, scratch)
+    set_spring_targets(n, x, motion, before, after, flight.offset_frame, scratch)
     v0, opposes_mean = v, False
-    if n <= work.mean_slip:
-        last = max(h, records.memory[work.i, WALL_MEMORY_STAGE])
-        opposes_mean = oppose_mean_slip(n, contact, v, w, last, work)
+    if n <= scratch.settings.mean_slip:
+        last = max(h, records.memory[body.i, WALL_MEMORY_STAGE])
+        opposes_mean = oppose_mean_slip(n, contact, v, w, last, scratch)
     width = rows_per_contact(contact)
-    load_warm_start(n, width, records.memory, work.i, h, work)
+    load_warm_start(n, width, records.memory, body.i, h, contacts)
     v = (v[0] + h * a[0], v[1] + h * a[1], v[2] + h * a[2])
     L = (L[0] + h * torque[0], L[1] + h * torque[1], L[2] + h * torque[2])
-    work.mode, work.residual_limit = int(records.memory[work.i, WALL_MEMORY_MODE]), rest_residual(h, work)
-    work.target_error_limit = TARGET_ERROR_SLOP_SHARE * work.slop / h
-    solved = solve_contacts(n, contact, v, L, R, work)
-    if opposes_mean and has_slip_reversed(n, solved[0], apply_inv_inertia(R, solved[1], work.J), work):
-        oppose_end_slip(n, work)
-        solved = solve_contacts(n, contact, v, L, R, work)
-    solved = cap_friction_work(n, contact, v0, w, solved, (v, L), R, h, work)
-    solved = limit_stage_energy(n, contact, v0, w, solved, (v, L), R, h, work)
-    v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, work)
-    records.memory[work.i, WALL_MEMORY_MODE] = work.mode
-    report_solve(records.report, work.world, residual, sweeps, method, work.tolerance)
-    store_warm_start(n, width, records.memory, work.i, h, work)
-    predict_end_gaps(n, v_new, apply_inv_inertia(R, L_new, work.J), after, work)
+    stage.mode, stage.residual_limit = int(records.memory[body.i, WALL_MEMORY_MODE]), rest_residual(h, scratch)
+    stage.target_error_limit = TARGET_ERROR_SLOP_SHARE * body.slop / h
+    solved = solve_contacts(n, contact, v, L, R, scratch)
+    if opposes_mean and has_slip_reversed(n, solved[0], apply_inv_inertia(R, solved[1], body.J), scratch):
+        oppose_end_slip(n, contacts)
+        solved = solve_contacts(n, contact, v, L, R, scratch)
+    solved = cap_friction_work(n, contact, v0, w, solved, (v, L), R, h, scratch)
+    solved = limit_stage_energy(n, contact, v0, w, solved, (v, L), R, h, scratch)
+    v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, scratch)
+    records.memory[body.i, WALL_MEMORY_MODE] = stage.mode
+    report_solve(records.report, body.world, residual, sweeps, method, scratch.settings.tolerance)
+    store_warm_start(n, width, records.memory, body.i, h, contacts)
+    predict_end_gaps(n, v_new, apply_inv_inertia(R, L_new, body.J), after, scratch)
     x = (x[0] + after * v_new[0], x[1] + after * v_new[1], x[2] + after * v_new[2])
-    return x, drift_attitude(q, L_new, work, after, flight.gyroscopic, flight.offset_frame), v_new, L_new
+    return x, drift_attitude(q, L_new, body, after, flight.gyroscopic, flight.offset_frame), v_new, L_new

@@ -46,12 +46,12 @@ def _added(L, s, T):
 
 
 @inlined
-def _against(n, width, across, along, w, work):
-    """Angular impulse against the turning w, from the normal impulses in `work`, with arms across and along normals."""
+def _against(n, width, across, along, w, scratch):
+    """Angular impulse against the turning w, from normal impulses in `scratch`, with arms across and along normals."""
     x = y = z = 0.0
     for k in range(n):
-        p = max(work.impulse[width * k], 0.0)
-        N = wall_normal(work.walls, wall_of(work.slot[k], work))
+        p = max(scratch.contacts.impulse[width * k], 0.0)
+        N = wall_normal(scratch.scene.walls, wall_of(scratch.contacts.slot[k], scratch.scene))
         spin = qt.dot(N, w)
         r = (w[0] - spin * N[0], w[1] - spin * N[1], w[2] - spin * N[2])
         size = math.sqrt(qt.dot(r, r))
@@ -62,18 +62,18 @@ def _against(n, width, across, along, w, work):
 
 
 @kernel
-def _resist(n, contact, across, along, v, L, solved, R, work):
+def _resist(n, contact, across, along, v, L, solved, R, scratch):
     """Solve with one torque: result of `solve_contacts`, and L with the torque but without the contacts."""
     width = rows_per_contact(contact)
-    w = apply_inv_inertia(R, solved[1], work.J)
-    T = _against(n, width, across, along, w, work)
+    w = apply_inv_inertia(R, solved[1], scratch.body.J)
+    T = _against(n, width, across, along, w, scratch)
     start = qt.dot(T, w)
     if not start < 0.0:
         return solved, L
     low, high, at_low, at_high, s = 0.0, 1.0, start, 0.0, 1.0
     for trial in range(_MAX_TORQUE_TRIALS):
-        solved = solve_contacts(n, contact, v, _added(L, s, T), R, work)
-        power = qt.dot(T, apply_inv_inertia(R, solved[1], work.J))
+        solved = solve_contacts(n, contact, v, _added(L, s, T), R, scratch)
+        power = qt.dot(T, apply_inv_inertia(R, solved[1], scratch.body.J))
         if (
             (s == 1.0 and not power > 0.0)
             or abs(power) <= -_STOPPED_POWER_SHARE * start
@@ -88,18 +88,19 @@ def _resist(n, contact, across, along, v, L, solved, R, work):
     return solved, _added(L, s, T)
 
 
-def _as_solved(n, contact, v, L, solved, R, work):
+def _as_solved(n, contact, v, L, solved, R, scratch):
     return solved
 
 
 @if_law((LAW_ROLLING, LAW_SPIN), _as_solved)
-def apply_resistance_torques(n, contact, v, L, solved, R, work):
+def apply_resistance_torques(n, contact, v, L, solved, R, scratch):
     """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
-    if work.shape == BLOCK:
+    body = scratch.body
+    if body.shape == BLOCK:
         return solved
-    across, along = rolling_radius(work), spin_radius(work)
+    across, along = rolling_radius(body), spin_radius(body)
     if across > 0.0:
-        solved, L = _resist(n, contact, across, 0.0, v, L, solved, R, work)
+        solved, L = _resist(n, contact, across, 0.0, v, L, solved, R, scratch)
     if along > 0.0:
-        solved, L = _resist(n, contact, 0.0, along, v, L, solved, R, work)
+        solved, L = _resist(n, contact, 0.0, along, v, L, solved, R, scratch)
     return solved

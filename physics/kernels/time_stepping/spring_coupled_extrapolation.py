@@ -35,7 +35,7 @@ _EASY_RULES = 5
 @kernel
 def _put_rate(t, offset_frame, linked):
     """Write the rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
-    room, bodies = linked.room, linked.work
+    room, bodies = linked.room, linked.body
     for b in range(bodies.shape[0]):
         s = room[PLANE_HERE, b]
         size = math.sqrt(s[3] * s[3] + s[4] * s[4] + s[5] * s[5] + s[6] * s[6])
@@ -98,7 +98,7 @@ def _extrapolate(row, h, linked):
     """
     room, worst = linked.room, 0.0
     for b in range(linked.state.shape[0]):
-        body = linked.work[b]
+        body = linked.body[b]
         v = (room[PLANE_HERE, b, 7], room[PLANE_HERE, b, 8], room[PLANE_HERE, b, 9])
         speed = math.sqrt(qt.dot(v, v)) + body.radius / h
         turning = speed * body.mass * body.radius
@@ -121,7 +121,7 @@ def _extrapolate(row, h, linked):
 @kernel
 def extrapolate_linked(h, offset_frame, linked):
     """Advance all bodies by h, to the tolerance; return whether the allowed steps sufficed."""
-    start, t, step = linked.work[0].now, 0.0, h
+    start, t, step = linked.body[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
         rules, error = 0, math.inf

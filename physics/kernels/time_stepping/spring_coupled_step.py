@@ -44,7 +44,7 @@ from physics.kernels.time_stepping.workspace import body_fields
 class LinkedWorld(NamedTuple):
     """Bodies of the world that a thread steps."""
 
-    work: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
+    body: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
     state: np.ndarray  # columns of `layout`
     touched: np.ndarray  # 0: no body is in contact
     room: np.ndarray  # states and rates of `spring_coupled_extrapolation`
@@ -70,11 +70,11 @@ def make_linked_world(
 def _substep(h, flight, linked):
     """Advance all bodies by h with the loads of the middle."""
     hold_linked_loads(h, flight.gyroscopic, flight.offset_frame, linked)
-    note_stage_energy(flight.offset_frame, linked, linked.work[0])
+    note_stage_energy(flight.offset_frame, linked, linked.body[0])
     for b in range(linked.state.shape[0]):
-        y = integrate_flight(read_state(linked.state, b), h, flight, linked.work[b])
+        y = integrate_flight(read_state(linked.state, b), h, flight, linked.body[b])
         write_state(linked.state, b, y)
-    limit_world_energy_gain(h, 1, flight.offset_frame, linked, linked.work[0])
+    limit_world_energy_gain(h, 1, flight.offset_frame, linked, linked.body[0])
 
 
 @inlined
@@ -88,16 +88,16 @@ def advance_world(world, grid, bodies, flight, held, events, records, linked):
     clear_report(world, records.report)
     for b in range(count):
         i = world * count + b
-        bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.offset_frame, linked.work[b])
-        bind_fields(bodies.params, i, flight.scheme, linked.work[b])
+        bind_body(world, i, bodies.shapes[b], bodies, None, None, flight.offset_frame, linked.body[b])
+        bind_fields(bodies.params, i, flight.scheme, linked.body[b])
         write_state(linked.state, b, read_state(bodies.state, i))
-    lost = find_overloaded_body(linked.work)
+    lost = find_overloaded_body(linked.body)
     if lost >= 0:
         report_fault(world, lost, records.report)
         return
     for k in range(grid.steps * grid.substeps):
         for b in range(count):
-            set_clock(k * h, linked.work[b])
+            set_clock(k * h, linked.body[b])
         if held is not None:
             _substep(h, flight, linked)
         if events is not None:
@@ -108,11 +108,11 @@ def advance_world(world, grid, bodies, flight, held, events, records, linked):
             break
         for b in range(count):
             write_state(bodies.state, world * count + b, read_state(linked.state, b))
-    report_unresolved_bodies(records.report, linked, linked.work[0])
+    report_unresolved_bodies(records.report, linked, linked.body[0])
     for b in range(count):
         i = world * count + b
         _, q, _, L = read_state(bodies.state, i)
-        w = angular_velocity(q, L, linked.work[b], flight.offset_frame)
+        w = angular_velocity(q, L, linked.body[b], flight.offset_frame)
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
 
 

@@ -96,45 +96,48 @@ def has_touched(memory, i):
 
 
 @inlined
-def forget_contacts(memory, i, work):
+def forget_contacts(memory, i, contacts):
     """Clear the contact memory of a body in the air."""
     if has_touched(memory, i):
-        store_warm_start(0, 0, memory, i, 0.0, work)
+        store_warm_start(0, 0, memory, i, 0.0, contacts)
 
 
 @inlined
-def fly_stage(y, h, flight, work):
+def fly_stage(y, h, flight, body):
     """Free motion over h under the held loads, cut into parts if they are stiff."""
-    return subdivide_stiff_flight(integrate_flight(y, h, flight, work), y, h, flight, work)
+    return subdivide_stiff_flight(integrate_flight(y, h, flight, body), y, h, flight, body)
 
 
 @inlined
-def advance_stage(n, y, h, contact, flight, records, work):
+def advance_stage(n, y, h, contact, flight, records, scratch):
     """One stage of length h: flight when nothing touches, else Moreau's step."""
+    body = scratch.body
     if n > 0:
-        hold_contact_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-        end = midpoint_step(n, y, h, contact, flight, records, work)
-        if hold_mean_loads(y, end, h, flight.gyroscopic, flight.offset_frame, work):
-            end = midpoint_step(n, y, h, contact, flight, records, work)
-        if is_stiff(work) and has_work_error(y, end, h, flight.offset_frame, work):
-            hold_softened_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-            end = midpoint_step(n, y, h, contact, flight, records, work)
-        return limit_energy_gain(y, end, h, False, flight.offset_frame, work)
-    hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-    forget_contacts(records.memory, work.i, work)
-    return fly_stage(y, h, flight, work)
+        hold_contact_loads(y, h, flight.gyroscopic, flight.offset_frame, body)
+        end = midpoint_step(n, y, h, contact, flight, records, scratch)
+        if hold_mean_loads(y, end, h, flight.gyroscopic, flight.offset_frame, body):
+            end = midpoint_step(n, y, h, contact, flight, records, scratch)
+        if is_stiff(body) and has_work_error(y, end, h, flight.offset_frame, body):
+            hold_softened_loads(y, h, flight.gyroscopic, flight.offset_frame, body)
+            end = midpoint_step(n, y, h, contact, flight, records, scratch)
+        return limit_energy_gain(y, end, h, False, flight.offset_frame, body)
+    hold_loads(y, h, flight.gyroscopic, flight.offset_frame, body)
+    forget_contacts(records.memory, body.i, scratch.contacts)
+    return fly_stage(y, h, flight, body)
 
 
 @inlined
-def outside_gap(y, offset_frame, work):
+def outside_gap(y, offset_frame, scratch):
     """Smallest gap outside the contact set [m], and the slot of its feature."""
-    return nearest_outside_set(y[0], to_matrix(y[1]), offset_frame, work)
+    return nearest_outside_set(y[0], to_matrix(y[1]), offset_frame, scratch)
 
 
 @inlined
-def find_contact_set(y, h, offset_frame, memory, work):
+def find_contact_set(y, h, offset_frame, memory, scratch):
     """Gather the contact set at y for a stage of length h: (count, depth)."""
-    return collect_wall_contacts(y, angular_velocity(y[1], y[3], work, offset_frame), h, offset_frame, memory, work)
+    return collect_wall_contacts(
+        y, angular_velocity(y[1], y[3], scratch.body, offset_frame), h, offset_frame, memory, scratch
+    )
 
 
 @inlined
@@ -144,15 +147,15 @@ def has_same_pose(y, z):
 
 
 @cold_kernel
-def keep_out_of_walls(y, offset_frame, work):
+def keep_out_of_walls(y, offset_frame, scratch):
     """State y, pushed out of walls where it is deeper than the slop, as bodies that turn by radians may be."""
     return lift_conserving_energy(
-        project_out_of_walls(y[0], to_matrix(y[1]), offset_frame, work), y, offset_frame, work
+        project_out_of_walls(y[0], to_matrix(y[1]), offset_frame, scratch), y, offset_frame, scratch.body
     )
 
 
 @cold_kernel
-def shorten_to_impact(n, y, end, h, contact, flight, records, work):
+def shorten_to_impact(n, y, end, h, contact, flight, records, scratch):
     """Shorten a stage over h to its first impact if a feature is through a wall at `end`: (state, time advanced).
 
     The stage is shortened until the feature is within half a slop of the wall, by `parabolic_root` of its gap. If
@@ -164,16 +167,16 @@ def shorten_to_impact(n, y, end, h, contact, flight, records, work):
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
     for _ in range(IMPACT_TRIALS):
-        gap, nearest = outside_gap(end, flight.offset_frame, work)
-        if nearest != slot and gap < -0.5 * work.slop:
+        gap, nearest = outside_gap(end, flight.offset_frame, scratch)
+        if nearest != slot and gap < -0.5 * scratch.body.slop:
             slot, high, high_gap = nearest, t, gap
-            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), flight.offset_frame, work), 0.0)
-            rate = feature_gap_rate(slot, low_end, flight.offset_frame, work)
+            low_gap = max(feature_gap(slot, low_end[0], to_matrix(low_end[1]), flight.offset_frame, scratch), 0.0)
+            rate = feature_gap_rate(slot, low_end, flight.offset_frame, scratch)
             bend = ((high_gap - low_gap) / (high - low) - rate) / (high - low)
         else:
             if nearest != slot:
-                gap = feature_gap(slot, end[0], to_matrix(end[1]), flight.offset_frame, work)
-            if abs(gap) <= 0.5 * work.slop:
+                gap = feature_gap(slot, end[0], to_matrix(end[1]), flight.offset_frame, scratch)
+            if abs(gap) <= 0.5 * scratch.body.slop:
                 break
             bend = second_difference(low, low_gap, t, gap, high, high_gap)
             if gap > 0.0:
@@ -184,60 +187,61 @@ def shorten_to_impact(n, y, end, h, contact, flight, records, work):
         if not t < high:  # nor where low and high are one, and t is not a number
             end, t = low_end, low
             break
-        end = advance_stage(n, y, t, contact, flight, records, work)
+        end = advance_stage(n, y, t, contact, flight, records, scratch)
         if has_same_pose(end, y):
             break
     return end, t
 
 
 @inlined
-def advance_to_impact(n, y, h, contact, flight, records, work):
+def advance_to_impact(n, y, h, contact, flight, records, scratch):
     """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
 
     An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
     shortened (`shorten_to_impact`: apart, so that what is hardly ever needed takes no part in what always is).
     """
-    end = advance_stage(n, y, h, contact, flight, records, work)
+    end = advance_stage(n, y, h, contact, flight, records, scratch)
     if has_same_pose(end, y):
         return end, h, False
-    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), flight.offset_frame, work)
-    if work.is_last or not has_passed:
+    has_passed, is_deep = check_penetration(end[0], to_matrix(end[1]), flight.offset_frame, scratch)
+    if scratch.stage.is_last or not has_passed:
         return end, h, is_deep
-    end, t = shorten_to_impact(n, y, end, h, contact, flight, records, work)
+    end, t = shorten_to_impact(n, y, end, h, contact, flight, records, scratch)
     return end, t, True
 
 
 @inlined
-def substep(y, start, h, contact, flight, records, work):
+def substep(y, start, h, contact, flight, records, scratch):
     """State after h, `start` after the call [s]: impacts at their times, flight or contact between them.
 
     When a substep has used up its cuts, the rest of it is one plastic stage, with contacts wherever it would pass a
     wall. Cuts for bodies that turn far (`half_space.conservative_advancement`) are counted apart. When those are used
     up, a body that turns far is treated as one that turns little.
     """
+    body, stage = scratch.body, scratch.stage
     left, splits, cuts = h, 0, 0
-    world = work.world
-    work.is_last = 0
+    world = body.world
+    stage.is_last = 0
     while True:
-        if splits == work.splits:
+        if splits == scratch.settings.splits:
             records.report[world, at.UNRESOLVED] += 1.0
-            work.is_last = 1
-        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, work)
-        n, depth = find_contact_set(y, left, flight.offset_frame, records.memory, work)
+            stage.is_last = 1
+        hold_loads(y, left, flight.gyroscopic, flight.offset_frame, body)
+        n, depth = find_contact_set(y, left, flight.offset_frame, records.memory, scratch)
         goes_on = False
         if n > 0:
             records.report[world, at.PENETRATION] = max(records.report[world, at.PENETRATION], depth)
-            if not work.is_last and not contact_stiffness(work) > 0.0:
+            if not stage.is_last and not contact_stiffness(body) > 0.0:
                 y, goes_on = resolve_impacts(
-                    n, y, start + (h - left), left, contact, flight.offset_frame, records, work
+                    n, y, start + (h - left), left, contact, flight.offset_frame, records, scratch
                 )
         span = left
-        is_cut = flies_exactly(flight) and cuts < MAX_TURNING_CUTS and not work.is_last
-        if is_cut and may_turn(y[3], h, FAR_TURN, flight.offset_frame, work):
-            span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, work)
-        end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, work)
+        is_cut = flies_exactly(flight) and cuts < MAX_TURNING_CUTS and not stage.is_last
+        if is_cut and may_turn(y[3], h, FAR_TURN, flight.offset_frame, body):
+            span = limit_turning_stage(n, y, h, left, flight.gyroscopic, flight.offset_frame, scratch)
+        end, t, is_deep = advance_to_impact(n, y, span, contact, flight, records, scratch)
         if goes_on:
-            add_to_warm_start(n, rows_per_contact(contact), records.memory, work)
+            add_to_warm_start(n, rows_per_contact(contact), records.memory, scratch)
         if t == span and span < left:
             cuts += 1
             if cuts == MAX_TURNING_CUTS:
@@ -245,41 +249,41 @@ def substep(y, start, h, contact, flight, records, work):
         else:
             splits += 1
         left -= t
-        advance_clock(t, work)
-        if is_deep and n > 0 and not contact_stiffness(work) > 0.0:
-            end = keep_out_of_walls(end, flight.offset_frame, work)
-        y = correct_spring_depth(n, y, end, t, flight.offset_frame, records.report, work)
-        if work.is_last or not left > 0.0:
+        advance_clock(t, body)
+        if is_deep and n > 0 and not contact_stiffness(body) > 0.0:
+            end = keep_out_of_walls(end, flight.offset_frame, scratch)
+        y = correct_spring_depth(n, y, end, t, flight.offset_frame, records.report, scratch)
+        if stage.is_last or not left > 0.0:
             break
         records.report[world, at.SPLITS] += 1.0
     return y
 
 
 @if_given("contact.acts", 0)
-def _clear_substeps(y, clear, h, left, contact, memory, work):
+def _clear_substeps(y, clear, h, left, contact, memory, scratch):
     """Number of substeps, of those `left`, without contact with a wall; `clear` if that is known."""
-    if clear > 0 or has_touched(memory, work.i):
+    if clear > 0 or has_touched(memory, scratch.body.i):
         return clear
-    clear = count_clear_substeps(y[0], y[2], h, left, work)
+    clear = count_clear_substeps(y[0], y[2], h, left, scratch)
     if clear > 0:
-        forget_contacts(memory, work.i, work)
+        forget_contacts(memory, scratch.body.i, scratch.contacts)
     return clear
 
 
-def _fly_substep(y, start, h, clear, contact, flight, records, work):
-    return fly_stage(y, h, flight, work)
+def _fly_substep(y, start, h, clear, contact, flight, records, scratch):
+    return fly_stage(y, h, flight, scratch.body)
 
 
 @if_given("contact.acts", _fly_substep)
-def _take_substep(y, start, h, clear, contact, flight, records, work):
+def _take_substep(y, start, h, clear, contact, flight, records, scratch):
     """State after a substep that begins at the time `start` of the step."""
     if clear == 0:
-        return substep(y, start, h, contact, flight, records, work)
-    return fly_stage(y, h, flight, work)
+        return substep(y, start, h, contact, flight, records, scratch)
+    return fly_stage(y, h, flight, scratch.body)
 
 
 @inlined
-def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, work):
+def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, scratch):
     """Advance each body of a world by `grid.steps` steps.
 
     A body in flight looks for walls only when it could be near one (`count_clear_substeps`); one that touched a wall is
@@ -287,6 +291,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
     is not finite keeps the old one, and its world's report counts the fault. Impacts go to `records.log`, if that has
     any room, their number to `records.counts`.
     """
+    body = scratch.body
     h, count, end = grid.h, bodies.shapes.shape[0], grid.steps * grid.substeps
     clear_report(world, records.report)
     clear_events(world, count, records.log, records.counts)
@@ -294,30 +299,30 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
         i = world * count + b
         if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
             continue
-        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, work)
-        if not has_finite_loads(work):
+        bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, body)
+        if not has_finite_loads(body):
             report_fault(world, b, records.report)
             continue
-        bind_fields(bodies.params, i, flight.scheme, work)
-        bind_laws(bodies.params, i, work)
+        bind_fields(bodies.params, i, flight.scheme, body)
+        bind_laws(bodies.params, i, body)
         y, clear = read_state(bodies.state, i), 0
         for k in range(end):
-            set_clock(k * h, work)
-            hold_loads(y, h, flight.gyroscopic, flight.offset_frame, work)
-            clear = _clear_substeps(y, clear, h, end - k, contact, records.memory, work)
-            new = _take_substep(y, k * h, h, clear, contact, flight, records, work)
+            set_clock(k * h, body)
+            hold_loads(y, h, flight.gyroscopic, flight.offset_frame, body)
+            clear = _clear_substeps(y, clear, h, end - k, contact, records.memory, scratch)
+            new = _take_substep(y, k * h, h, clear, contact, flight, records, scratch)
             clear = max(clear - 1, 0)
             if not is_finite(new):
                 report_fault(world, b, records.report)
                 drop_events(i, 1, k * h, records.log, records.counts)
                 break
             y = new
-            if sleep is not None and falls_asleep(i, y, h, work, sleep):
+            if sleep is not None and falls_asleep(i, y, h, body, sleep):
                 y = without_velocities(y)
                 break
-        report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, work)
+        report_unresolved_body(not has_same_pose(y, read_state(bodies.state, i)), records.report, body)
         write_state(bodies.state, i, y)
-        w = angular_velocity(y[1], y[3], work, flight.offset_frame)
+        w = angular_velocity(y[1], y[3], body, flight.offset_frame)
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
 
 

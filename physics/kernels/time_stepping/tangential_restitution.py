@@ -32,44 +32,48 @@ def _no_aim(*arguments):
 
 
 @inlined
-def set_tangential_target(k, y, offset_frame, work):
+def set_tangential_target(k, y, offset_frame, scratch):
     """Target along the wall of contact k, from the velocity of its point."""
+    scene, contacts = scratch.scene, scratch.contacts
     _, q, v, L = y
-    w = angular_velocity(q, L, work, offset_frame)
-    u = qt.cross(w, (work.arm[k, 0], work.arm[k, 1], work.arm[k, 2]))
+    w = angular_velocity(q, L, scratch.body, offset_frame)
+    u = qt.cross(w, (contacts.arm[k, 0], contacts.arm[k, 1], contacts.arm[k, 2]))
     u = (u[0] + v[0], u[1] + v[1], u[2] + v[2])
-    share, wall = tangential_restitution(work), wall_of(work.slot[k], work)
-    work.target[k, 1] = -share * qt.dot(wall_axis(work.walls, wall, WALL_TANGENT_1), u)
-    work.target[k, 2] = -share * qt.dot(wall_axis(work.walls, wall, WALL_TANGENT_2), u)
+    share, wall = tangential_restitution(scratch.body), wall_of(contacts.slot[k], scene)
+    contacts.target[k, 1] = -share * qt.dot(wall_axis(scene.walls, wall, WALL_TANGENT_1), u)
+    contacts.target[k, 2] = -share * qt.dot(wall_axis(scene.walls, wall, WALL_TANGENT_2), u)
 
 
 @if_law((LAW_TANGENTIAL,), _no_aim)
-def set_tangential_targets(n, bounce_speed, y, offset_frame, work):
+def set_tangential_targets(n, bounce_speed, y, offset_frame, scratch):
     """Set targets along the wall of the single bouncing contact; with several, friction alone acts along them."""
     bouncing, found = 0, 0
     for i in range(n):
-        if -work.speed[i] > bounce_speed:
+        if -scratch.contacts.speed[i] > bounce_speed:
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
-        set_tangential_target(found, y, offset_frame, work)
+        set_tangential_target(found, y, offset_frame, scratch)
 
 
 @inlined
-def _energy(v, L, R, work):
+def _energy(v, L, R, body):
     """Kinetic energy [J]."""
-    return 0.5 * (work.mass * qt.dot(v, v) + qt.dot(L, apply_inv_inertia(R, L, work.J)))
+    return 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, apply_inv_inertia(R, L, body.J)))
 
 
 @if_law((LAW_TANGENTIAL,), _as_solved)
-def reject_energy_gain(n, contact, v, L, solved, R, work):
+def reject_energy_gain(n, contact, v, L, solved, R, scratch):
     """Result of `solve_contacts` for v and L, or the one without `set_tangential_targets` if that has gained energy.
 
     A sphere's only contact cannot gain energy, since its motions along and across the wall do not mix. A contact of a
     sphere that also rests on another wall can, because the coefficients differ.
     """
-    if n == 1 or not _energy(solved[0], solved[1], R, work) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(v, L, R, work):
+    contacts = scratch.contacts
+    if n == 1 or not _energy(solved[0], solved[1], R, scratch.body) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(
+        v, L, R, scratch.body
+    ):
         return solved
     for i in range(n):
-        work.target[i, 1] = work.target[i, 2] = 0.0
-        work.impulse[3 * i] = work.impulse[3 * i + 1] = work.impulse[3 * i + 2] = 0.0
-    return solve_contacts(n, contact, v, L, R, work)
+        contacts.target[i, 1] = contacts.target[i, 2] = 0.0
+        contacts.impulse[3 * i] = contacts.impulse[3 * i + 1] = contacts.impulse[3 * i + 2] = 0.0
+    return solve_contacts(n, contact, v, L, R, scratch)

@@ -56,26 +56,32 @@ def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> lis
     ]
 
 
-def workspace_dtype(
-    wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
-) -> np.dtype:
-    """Record type for bodies with `features` contact features each on `wall_count` walls, with fields and laws."""
-    n = max(wall_count * features, 1)
-    float_size, int_size = np.maximum(pyramid_sizes(n), normal_lcp_sizes(n)).tolist()
+def _scene_fields(wall_count: int) -> list[tuple]:
+    """Fields of the walls, and of the features that meet them."""
     f, i = np.float64, np.int64
-    scene = [
+    return [
         ("features", i),
         ("feature_bits", i),  # log2 of it
         ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
-    stage = [
+
+
+def _stage_fields() -> list[tuple]:
+    """Fields that one stage, or one solve, hands to the next."""
+    f, i = np.float64, np.int64
+    return [
         ("mode", i),  # the direct solve to try first, then the one that solved it (`sliding_patch.TRY_STICKING` ...)
         ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
         ("target_error_limit", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
         ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
     ]
-    contacts = [
-        ("mask", i, (max(wall_count, 1),)),  # bit k: feature k of the body is in the contact set of this wall
+
+
+def _contact_fields(walls: int, n: int, laws: tuple[str, ...]) -> list[tuple]:
+    """Fields of up to n contacts: their set, the problem that it poses, and last the outputs of a solve."""
+    f, i = np.float64, np.int64
+    contact_set = [
+        ("mask", i, (walls,)),  # bit k: feature k of the body is in the contact set of this wall
         ("vertices", f, (2, VERTEX_COUNT)),  # gap [m] and normal velocity [m/s] of each vertex at one wall
         ("slot", i, (n,)),  # wall * features + feature, the stable name of a contact
         ("gap", f, (n,)),  # [m], negative when penetrating
@@ -83,6 +89,8 @@ def workspace_dtype(
         ("speed", f, (n,)),  # normal velocity before the stage [m/s], negative when approaching
         ("widest", f),  # largest gap of them all, 0 if there is none above a wall [m]
         ("approach", f),  # fastest approach of them all, 0 if none does [m/s]
+    ]
+    problem = [
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass, world frame [m]
         ("target", f, (n, 3)),  # contact velocity aimed at (normal, tangents) [m/s]
         ("held_target", f, (MEAN_SLIP_CONTACTS, 2)),  # tangents of contacts that hold (`midpoint_friction`) [m/s]
@@ -92,10 +100,22 @@ def workspace_dtype(
         ("response", f, (3 * n, 3)),  # I⁻¹ (arm x direction) [1/(kg m)]
         ("delassus", f, (3 * n, 3 * n)),  # W = J M⁻¹ Jᵀ [1/kg]
         ("bias", f, (3 * n,)),  # b of u = W p + b [m/s]
-        ("impulse", f, (3 * n,)),  # p [N s]
+    ]
+    outputs = [
+        ("impulse", f, (3 * n,)),  # p, before a solve the warm start [N s]
+        ("velocity", f, (3 * n,)),  # u, of iterative solves [m/s]
+        ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]
+    ]
+    return contact_set + problem + outputs
+
+
+def _solver_fields(n: int) -> list[tuple]:
+    """Fields in which the solvers of n contacts keep numbers of their own: no other kernel reads them."""
+    float_size, int_size = np.maximum(pyramid_sizes(n), normal_lcp_sizes(n)).tolist()
+    f, i = np.float64, np.int64
+    return [
         ("saved", f, (3 * n,)),  # p of the sweeps while the fallback tries [N s]
         ("change", f, (3 * n,)),  # of p in the last sweep [N s]
-        ("velocity", f, (3 * n,)),  # u [m/s]
         ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`sticking`) or a list (`sliding_patch`)
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
         ("across", f, (n, 2)),  # of `sticking`: tangential impulse [N s]
@@ -107,24 +127,42 @@ def workspace_dtype(
         ("local", f, (n, 12)),  # see `contact_solver.gauss_seidel.invert_contact_blocks`
         ("fallback_float", f, (float_size,)),
         ("fallback_int", i, (int_size,)),
-        ("rebound", f, (3 * n,)),  # p of an impact with all of its rebound, where there is less energy [N s]
     ]
-    return np.dtype(setting_fields() + scene + body_fields(terms, laws) + stage + contacts)
+
+
+def workspace_dtype(
+    wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
+) -> np.dtype:
+    """Record type for bodies with `features` contact features each on `wall_count` walls, with fields and laws."""
+    n = max(wall_count * features, 1)
+    groups = {
+        "settings": setting_fields(),
+        "scene": _scene_fields(wall_count),
+        "body": body_fields(terms, laws),
+        "stage": _stage_fields(),
+        "contacts": _contact_fields(max(wall_count, 1), n, laws),
+        "solver": _solver_fields(n),
+    }
+    return np.dtype([(name, np.dtype(fields)) for name, fields in groups.items()])
 
 
 def make_workspace(
     walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), **settings: float
 ) -> np.ndarray:
     """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
-    work = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
-    work["features"], work["feature_bits"], work["residual_limit"] = features, features.bit_length() - 1, np.inf
+    scratch = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
+    scene = scratch["scene"]
+    scene["features"], scene["feature_bits"] = features, features.bit_length() - 1
     if len(walls):
-        work["walls"][0] = walls
+        scene["walls"][0] = walls
+    scratch["stage"]["residual_limit"] = np.inf
     for name, value in settings.items():
-        work[name] = value
-    return work
+        scratch["settings" if name in scratch.dtype["settings"].names else "body"][name] = value
+    return scratch
 
 
 def body_records(scratch) -> np.ndarray:
     """Records of `body_fields` in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
-    return getattr(getattr(scratch, "bodies", scratch), "work", scratch)
+    if isinstance(scratch, np.ndarray):
+        return scratch["body"]
+    return getattr(scratch, "bodies", scratch).body

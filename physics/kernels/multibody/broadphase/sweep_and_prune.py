@@ -27,7 +27,7 @@ _SPIN_GROWTH = 1.5
 def center_motion_bound(b, h, many):
     """Bound of the displacement of body b's centre of mass, and of its bounding sphere, in h without contact [m]."""
     t = many.bodies.twist
-    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies.work[b].acceleration
+    return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies.body[b].acceleration
 
 
 @inlined
@@ -41,7 +41,7 @@ def surface_motion_bound(b, h, many):
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
     if many.bodies.spin_bound[b] > 0.0:
         turn *= _SPIN_GROWTH
-    return center_motion_bound(b, h, many) + many.bodies.work[b].radius * min(turn, 2.0)
+    return center_motion_bound(b, h, many) + many.bodies.body[b].radius * min(turn, 2.0)
 
 
 @inlined
@@ -51,15 +51,15 @@ def may_reach_wall(b, wall, h, many):
         qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.state, b, POS))
         - many.walls[wall, WALL_OFFSET]
     )
-    return not d > many.bodies.work[b].radius + center_motion_bound(b, h, many) + many.bodies.work[b].slop
+    return not d > many.bodies.body[b].radius + center_motion_bound(b, h, many) + many.bodies.body[b].slop
 
 
 @inlined
 def may_meet(a, b, h, many):
     """True if the bounding spheres of two bodies may touch within h."""
     far = (
-        many.bodies.work[a].radius
-        + many.bodies.work[b].radius
+        many.bodies.body[a].radius
+        + many.bodies.body[b].radius
         + center_motion_bound(a, h, many)
         + center_motion_bound(b, h, many)
     )
@@ -71,7 +71,7 @@ def may_meet(a, b, h, many):
 @inlined
 def half_extent(b, axis, many):
     """Half the width of body b along a world axis [m]; of a hull that of the block with its `dimensions`."""
-    R, d, shape = many.bodies.rotation, many.bodies.work[b].dims, many.bodies.work[b].shape
+    R, d, shape = many.bodies.rotation, many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return d[0]
     if shape == HULL:
@@ -84,7 +84,7 @@ def half_extent(b, axis, many):
 def write_swept_boxes(h, many):
     """Write `many.box`: the region that every body may sweep in h, plus the slop."""
     for b in range(many.bodies.state.shape[0]):
-        margin = surface_motion_bound(b, h, many) + many.bodies.work[b].slop
+        margin = surface_motion_bound(b, h, many) + many.bodies.body[b].slop
         for axis in range(3):
             half = half_extent(b, axis, many) + margin
             many.bodies.box[b, axis] = many.bodies.center[b, axis] - half

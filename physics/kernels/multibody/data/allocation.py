@@ -121,7 +121,7 @@ def _make_bodies(bodies: int, terms: tuple[Term, ...], relative_slop: float) -> 
     records = np.zeros(bodies, np.dtype(body_fields(terms)))
     records["relative_slop"] = relative_slop
     return Bodies(
-        work=records,
+        body=records,
         state=np.zeros((bodies, STATE_SIZE)),
         rotation=np.zeros((bodies, 9)),
         inv_mass=np.zeros(bodies),

@@ -85,7 +85,7 @@ class WorldSnapshots(NamedTuple):
 class Bodies(NamedTuple):
     """Bodies of the world: parameters, poses and motion."""
 
-    work: np.ndarray  # (bodies,) records: parameters and loads, see `time_stepping.workspace.body_fields`
+    body: np.ndarray  # (bodies,) records: parameters and loads, see `time_stepping.workspace.body_fields`
     state: np.ndarray  # (bodies, STATE_SIZE) columns of `layout`
     rotation: np.ndarray  # (bodies, 9) body frame to world, row by row
     inv_mass: np.ndarray  # (bodies,) 1/mass [1/kg]

@@ -112,8 +112,8 @@ def contact_velocity(k, many):
 def pair_slop(a, b, many):
     """Largest gap of touching bodies, or of body a and a wall (b < 0) [m]."""
     if b < 0:
-        return many.bodies.work[a].slop
-    return min(many.bodies.work[a].slop, many.bodies.work[b].slop)
+        return many.bodies.body[a].slop
+    return min(many.bodies.body[a].slop, many.bodies.body[b].slop)
 
 
 @inlined
@@ -127,9 +127,9 @@ def parted_slack(k, many):
 @inlined
 def arrival_gap(a, b, many):
     """Gap at which a body that turns far counts as arrived at a wall (b < 0) or another body [m]."""
-    radius = many.bodies.work[a].radius
+    radius = many.bodies.body[a].radius
     if b >= 0:
-        radius = min(radius, many.bodies.work[b].radius)
+        radius = min(radius, many.bodies.body[b].radius)
     return max(pair_slop(a, b, many), ARRIVAL_SHARE * radius)
 
 
@@ -144,16 +144,16 @@ def relative_acceleration_bound(k, many):
     """Bound of the relative acceleration of a contact's points without contact [m/s²]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if b < 0:
-        return many.bodies.work[a].acceleration
-    return many.bodies.work[a].acceleration + many.bodies.work[b].acceleration
+        return many.bodies.body[a].acceleration
+    return many.bodies.body[a].acceleration + many.bodies.body[b].acceleration
 
 
 @inlined
 def _combine_materials(k, a, b, many):
     """Coefficients of a pair: geometric mean of friction, larger restitution; at a wall the body's."""
-    mu, e = many.bodies.work[a].mu, many.bodies.work[a].restitution
+    mu, e = many.bodies.body[a].mu, many.bodies.body[a].restitution
     if b >= 0:
-        mu, e = math.sqrt(mu * many.bodies.work[b].mu), max(e, many.bodies.work[b].restitution)
+        mu, e = math.sqrt(mu * many.bodies.body[b].mu), max(e, many.bodies.body[b].restitution)
     many.contacts.mu[k], many.contacts.restitution[k] = mu, e
 
 
@@ -171,7 +171,7 @@ def _first_body_share(a, b, many):
 
     The weight is 1 or 0 if one body is rounder, so that its point stays under its centre, and 1/2 if neither is.
     """
-    one, other = many.bodies.work[a].shape, many.bodies.work[b].shape
+    one, other = many.bodies.body[a].shape, many.bodies.body[b].shape
     if one != other:
         for shape in (SPHERE, ELLIPSOID):
             if one == shape:
@@ -234,13 +234,13 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
         return False
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, b
     _write_anchor(k, a, 0, points[0], many)
-    acceleration = many.bodies.work[a].acceleration
+    acceleration = many.bodies.body[a].acceleration
     partner = count - 1 - b
     if b >= 0:
         _write_anchor(k, b, 3, points[1], many)
         if owner != PARTED:
             _join_points(k, a, b, owner, gap, normal, many)
-        acceleration += many.bodies.work[b].acceleration
+        acceleration += many.bodies.body[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
     speed = qt.dot(normal, relative_velocity(k, many.bodies.twist, many))
@@ -283,7 +283,7 @@ def _carried_point(b, k, first, side, n, many):
 
     On a round body this is the point with the contact's normal: turning brings another point there.
     """
-    shape, d = many.bodies.work[b].shape, many.bodies.work[b].dims
+    shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
         r = side * d[0]
         return (r * n[0], r * n[1], r * n[2])
@@ -303,7 +303,7 @@ def _turn_frame(k, a, b, many):
     if owner >= 0:
         n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
         write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and many.bodies.work[a].shape == SPHERE == many.bodies.work[b].shape:
+    elif b >= 0 and owner != PARTED and many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
         d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
         size = math.sqrt(qt.dot(d, d))
         if size > 0.0:

@@ -15,15 +15,15 @@ from physics.kernels.state.body import angular_velocity, principal_attitude, rea
 def update_body_pose(b, offset_frame, many):
     """Compute rotation, geometric centre and inverse inertia of body b from its present state, world frame."""
     x, q, _, _ = read_state(many.bodies.state, b)
-    work = many.bodies.work[b]
+    body = many.bodies.body[b]
     R = qt.to_matrix(q)
     for c in range(9):
         many.bodies.rotation[b, c] = R[c]
-    put_vector(many.bodies.center, b, 0, geometric_center(x, R, work, offset_frame))
+    put_vector(many.bodies.center, b, 0, geometric_center(x, R, body, offset_frame))
     P = R
     if offset_frame is not None:
-        P = qt.to_matrix(principal_attitude(q, work, offset_frame))
-    J, K = work.J, many.bodies.inv_inertia
+        P = qt.to_matrix(principal_attitude(q, body, offset_frame))
+    J, K = body.J, many.bodies.inv_inertia
     K[b, 0] = J[0] * P[0] * P[0] + J[1] * P[1] * P[1] + J[2] * P[2] * P[2]
     K[b, 1] = J[0] * P[0] * P[3] + J[1] * P[1] * P[4] + J[2] * P[2] * P[5]
     K[b, 2] = J[0] * P[0] * P[6] + J[1] * P[1] * P[7] + J[2] * P[2] * P[8]
@@ -39,4 +39,4 @@ def update_poses_and_twists(offset_frame, many):
         update_body_pose(b, offset_frame, many)
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
         q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], offset_frame))

@@ -120,7 +120,7 @@ def update_sleep(world, h, sleep, many):
     first, is_time = world * many.bodies.state.shape[0], False
     for b in range(many.bodies.state.shape[0]):
         if not is_asleep(first + b, sleep) and update_sleep_window(
-            first + b, read_state(many.bodies.state, b), h, many.bodies.work[b], sleep
+            first + b, read_state(many.bodies.state, b), h, many.bodies.body[b], sleep
         ):
             is_time = True
     if is_time:

@@ -15,7 +15,7 @@ from physics.kernels.state.layout import BLOCK, VERTEX_COUNT, WALL_NORMAL, WALL_
 @kernel
 def collide_body_wall(b, wall, margin, h, many):
     """Add the contacts of body b with a wall that are at most `margin` [m] from it."""
-    body, R = many.bodies.work[b], row_matrix(many.bodies.rotation, b)
+    body, R = many.bodies.body[b], row_matrix(many.bodies.rotation, b)
     n, x = row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.center, b, 0)
     d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
     if d > body.radius + margin:
@@ -45,7 +45,7 @@ def collide_hull_wall(b, wall, margin, h, many):
         many.narrowphase.hulls.of[b, FIRST_CORNER],
     )
     d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
-    if d > many.bodies.work[b].radius + margin:
+    if d > many.bodies.body[b].radius + margin:
         return
     for k in range(many.narrowphase.hulls.of[b, LAST_CORNER] - first):
         r = corner_arm(b, first + k, many)

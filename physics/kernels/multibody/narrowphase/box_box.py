@@ -51,7 +51,7 @@ def _clip_face(a, b, face, many):
     """Clip the face opposite to this one by its sides: (copy of the polygon, vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
-    d, slop = many.bodies.work[r].dims, pair_slop(a, b, many)
+    d, slop = many.bodies.body[r].dims, pair_slop(a, b, many)
     source, count = 0, 4
     for side in range(4):
         k, s = side // 2, 1.0 - 2.0 * (side % 2)
@@ -95,7 +95,7 @@ def _point_above_face(r, x, y, s, t, many):
 def _add_face_contacts(a, b, face, source, count, least, h, many):
     """Contacts between a face and the clipped face of the other block, lifted until none has a gap < least."""
     r, o, axis, sign = _reference_face(a, b, face, many)
-    d = many.bodies.work[r].dims
+    d = many.bodies.body[r].dims
     if count == 0:
         write_incident_face(r, o, axis, sign, many)
         source, count = keep_deepest_vertex(d[(axis + 1) % 3], d[(axis + 2) % 3], many), 1
@@ -131,7 +131,7 @@ def _add_face_contacts(a, b, face, source, count, least, h, many):
 @inlined
 def _middle_of_edge(b, k, n, many):
     """Middle of the edge of block b along its axis k that reaches furthest along n, world frame [m]."""
-    R, d = many.bodies.rotation, many.bodies.work[b].dims
+    R, d = many.bodies.rotation, many.bodies.body[b].dims
     point = row_vector(many.bodies.center, b, 0)
     for j in range(3):
         axis = body_axis(R, b, j)
@@ -154,8 +154,8 @@ def _add_edge_contact(a, b, edges, gap, h, many):
     # Points p + s x and q + t y whose difference is along n.
     w, c = subtract(q, p), qt.dot(x, y)
     t = (c * qt.dot(x, w) - qt.dot(y, w)) / (1.0 - c * c)
-    s = clamp_to_half_width(qt.dot(x, w) + t * c, many.bodies.work[a].dims[i])
-    t = clamp_to_half_width(t, many.bodies.work[b].dims[j])
+    s = clamp_to_half_width(qt.dot(x, w) + t * c, many.bodies.body[a].dims[i])
+    t = clamp_to_half_width(t, many.bodies.body[b].dims[j])
     add_contact(a, b, _FIRST_EDGE_FEATURE + edges, -1, n, (add_scaled(p, s, x), add_scaled(q, t, y)), gap, h, many)
 
 

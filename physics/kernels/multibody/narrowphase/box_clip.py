@@ -68,7 +68,7 @@ def write_incident_face(r, o, axis, sign, many):
 
     Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
     """
-    R, d, p = many.bodies.rotation, many.bodies.work[o].dims, many.narrowphase.polygon
+    R, d, p = many.bodies.rotation, many.bodies.body[o].dims, many.narrowphase.polygon
     out = body_axis(R, r, axis)
     out = (sign * out[0], sign * out[1], sign * out[2])
     x, y = body_axis(R, r, (axis + 1) % 3), body_axis(R, r, (axis + 2) % 3)

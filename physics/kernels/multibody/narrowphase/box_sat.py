@@ -51,7 +51,7 @@ def max_box_face_separation(a, b, margin, many):
 
     The search stops at a face that separates by more than `margin` [m].
     """
-    S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.work[a].dims, many.bodies.work[b].dims
+    S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.body[a].dims, many.bodies.body[b].dims
     way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
     best, face = -math.inf, 0
     slop = pair_slop(a, b, many)
@@ -78,7 +78,7 @@ def max_box_edge_separation(a, b, margin, many):
         many.narrowphase.relative_axes[SIZES],
         many.narrowphase.relative_axes[FROM_A, 0],
     )
-    da, db = many.bodies.work[a].dims, many.bodies.work[b].dims
+    da, db = many.bodies.body[a].dims, many.bodies.body[b].dims
     best, edges = -math.inf, 0
     for i in range(3):
         ip, iq = (i + 1) % 3, (i + 2) % 3

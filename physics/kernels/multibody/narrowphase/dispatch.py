@@ -30,7 +30,7 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     nothing approaches are left out.
     """
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = many.counts[NUM_STOPPING] = 0
-    bodies = many.bodies.work
+    bodies = many.bodies.body
     first_row = world * bodies.shape[0]
     if many.settings[0].meet == 1:
         find_pairs(h, many)

@@ -247,18 +247,18 @@ def relative_rotation(R, S):
 def collide_ellipsoid(a, b, margin, h, many):
     """Add the contact of an ellipsoid and any body, in either order, in the frame of the other body."""
     first, second = a, b
-    if many.bodies.work[a].shape != ELLIPSOID:
+    if many.bodies.body[a].shape != ELLIPSOID:
         first, second = b, a
     R, size, d = (
         row_matrix(many.bodies.rotation, second),
-        many.bodies.work[second].dims,
-        many.bodies.work[first].dims,
+        many.bodies.body[second].dims,
+        many.bodies.body[first].dims,
     )
     x, dims = row_vector(many.bodies.center, second, 0), (size[0], size[1], size[2])
     way = qt.transposed_matvec(R, subtract(row_vector(many.bodies.center, first, 0), x))
     A = ellipsoid_matrix(relative_rotation(R, row_matrix(many.bodies.rotation, first)), (d[0], d[1], d[2]))
     B = (size[0] * size[0], 0.0, 0.0, size[1] * size[1], 0.0, size[2] * size[2])
-    is_block = many.bodies.work[second].shape == BLOCK
+    is_block = many.bodies.body[second].shape == BLOCK
     start = nearest_on_block(way, dims)[1] if is_block else center_direction(way)
     n, gap = max_separation_direction(A, is_block, B, dims, way, start)
     if gap > margin:

@@ -44,7 +44,7 @@ def support_point(b, x, R, k, thinner, hulls, many):
 
     The body is taken thinner by `thinner` [m] on all sides.
     """
-    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
+    d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return add_scaled(x, d[0] - thinner, k)
     e = qt.transposed_matvec(R, k)
@@ -64,7 +64,7 @@ def support_point(b, x, R, k, thinner, hulls, many):
 @inlined
 def _core_point(b, x, R, k, thinner, hulls, many):
     """`support_point` of the core of body b: the centre of a sphere, any other body itself; k of any length."""
-    if many.bodies.work[b].shape == SPHERE:
+    if many.bodies.body[b].shape == SPHERE:
         return x
     return support_point(b, x, R, k, thinner, hulls, many)
 
@@ -133,7 +133,7 @@ def closest_on_simplex(count, many):
 @inlined
 def _core_radius(b, thinner, many):
     """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
-    return many.bodies.work[b].dims[0] - thinner if many.bodies.work[b].shape == SPHERE else 0.0
+    return many.bodies.body[b].dims[0] - thinner if many.bodies.body[b].shape == SPHERE else 0.0
 
 
 @kernel

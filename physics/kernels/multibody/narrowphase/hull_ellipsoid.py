@@ -68,9 +68,9 @@ def nearest_on_hull(b, x, many):
 def collide_sphere_hull(a, b, margin, h, many):
     """Add the contact of a sphere and a hull, in either order."""
     ball, hull = a, b
-    if many.bodies.work[b].shape == SPHERE:
+    if many.bodies.body[b].shape == SPHERE:
         ball, hull = b, a
-    origin, r = row_vector(many.bodies.center, hull, 0), many.bodies.work[ball].dims[0]
+    origin, r = row_vector(many.bodies.center, hull, 0), many.bodies.body[ball].dims[0]
     x = row_vector(many.bodies.center, ball, 0)
     pose_hull(0, hull, origin, many)
     y, n, distance = nearest_on_hull(hull, subtract(x, origin), many)
@@ -118,12 +118,12 @@ def collide_ellipsoid_hull(a, b, margin, h, many):
     taken. If the two are apart this is the right one. If they overlap, edges may fail, and a face is the way out.
     """
     round_, hull = a, b
-    if many.bodies.work[b].shape == ELLIPSOID:
+    if many.bodies.body[b].shape == ELLIPSOID:
         round_, hull = b, a
     hulls, origin, size = (
         many.narrowphase.hulls,
         row_vector(many.bodies.center, hull, 0),
-        many.bodies.work[round_].dims,
+        many.bodies.body[round_].dims,
     )
     pose_hull(0, hull, origin, many)
     way, S, dims = (

@@ -15,8 +15,8 @@ from physics.kernels.state.layout import BLOCK
 @inlined
 def hull_scale(b, many):
     """Scale of the corners of body b in the tables."""
-    d = many.bodies.work[b].dims
-    if many.bodies.work[b].shape == BLOCK:
+    d = many.bodies.body[b].dims
+    if many.bodies.body[b].shape == BLOCK:
         return (d[0], d[1], d[2])
     return (1.0, 1.0, 1.0)
 

@@ -22,7 +22,7 @@ from physics.kernels.state.layout import BLOCK
 def collide_spheres(a, b, margin, h, many):
     """Add the contact of two spheres."""
     x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
-    ra, rb = many.bodies.work[a].dims[0], many.bodies.work[b].dims[0]
+    ra, rb = many.bodies.body[a].dims[0], many.bodies.body[b].dims[0]
     n = subtract(x, y)
     size = math.sqrt(qt.dot(n, n))
     if size - ra - rb > margin:
@@ -35,12 +35,12 @@ def collide_spheres(a, b, margin, h, many):
 def collide_sphere_block(a, b, margin, h, many):
     """Add the contact of a sphere and a block, in either order."""
     ball, brick = a, b
-    if many.bodies.work[a].shape == BLOCK:
+    if many.bodies.body[a].shape == BLOCK:
         ball, brick = b, a
     R, dims, r = (
         row_matrix(many.bodies.rotation, brick),
-        many.bodies.work[brick].dims,
-        many.bodies.work[ball].dims[0],
+        many.bodies.body[brick].dims,
+        many.bodies.body[ball].dims[0],
     )
     x, y = row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, brick, 0)
     q, n, distance = nearest_on_block(qt.transposed_matvec(R, subtract(x, y)), (dims[0], dims[1], dims[2]))

@@ -130,7 +130,7 @@ def order_elimination(first, last, begin, end, most, many):
         many.system.bucket[d] = _NO_ENTRY
     for i in range(end - 1, begin - 1, -1):
         _put_in_bucket(many.islands.bodies[i], many)
-    at = least = work = 0
+    at = least = cost = 0
     for i in range(begin, end):
         while many.system.bucket[least] == _NO_ENTRY:
             least += 1
@@ -142,8 +142,8 @@ def order_elimination(first, last, begin, end, most, many):
             return -1
         many.system.stop[b] = at
         d = at - many.system.start[b]
-        work += 1 + d + d * d
-        if work > most:
+        cost += 1 + d + d * d
+        if cost > most:
             return -1
         least = max(0, least - 1)
-    return work
+    return cost

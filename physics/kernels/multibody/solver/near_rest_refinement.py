@@ -48,7 +48,7 @@ def _refined_tolerance(goal, least):
 def point_speed_bound(v, w, b, many):
     """Bound of the speed of any point of body b that moves with v and turns with w [m/s]."""
     linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
-    return linear + many.bodies.work[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
+    return linear + many.bodies.body[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
 
 
 @inlined

@@ -60,10 +60,10 @@ def compute_defect(part, rho, all_hold, many):
         v, w, r = (
             row_vector(many.newton.defect, b, 0),
             row_vector(many.newton.defect, b, ANGULAR_OFFSET),
-            many.bodies.work[b].radius,
+            many.bodies.body[b].radius,
         )
         square = qt.dot(v, v) + r * r * qt.dot(w, w)
-        total += many.bodies.work[b].mass * square
+        total += many.bodies.body[b].mass * square
         worst = max(worst, square)
     return math.sqrt(total), math.sqrt(worst)
 

@@ -50,7 +50,7 @@ _SWEEP_COST = 25.0
 _CONTACT_COST = 230.0
 _BLOCK_COST = 60.0
 
-# Work that iterations with the system may take, in that of the sweeps allowed: while a pile moves and all is new in the
+# Cost that iterations with the system may have, in that of the sweeps allowed: while a pile moves and all is new in the
 # next step; and once it nearly lies, where what is solved once holds for long, and what is not creeps for ever.
 # Fewer iterations than these lead nowhere.
 MOVING_BUDGET = 10.0
@@ -166,7 +166,7 @@ def _heaviest(part, many):
     """Largest mass among the bodies of the problem [kg]."""
     mass = 0.0
     for i in range(part[2], part[3]):
-        mass = max(mass, many.bodies.work[many.islands.bodies[i]].mass)
+        mass = max(mass, many.bodies.body[many.islands.bodies[i]].mass)
     return mass
 
 
@@ -174,8 +174,8 @@ def _heaviest(part, many):
 def prepare_system(part, sweeps, worth, fewest, many):
     """Order the bodies for the linear system; return the iterations that an island is worth, 0 if it costs too much.
 
-    A problem with so many sweeps allowed is worth `worth` times their work. It costs too much if that pays for fewer
-    than `fewest` iterations. This is known before much work is done.
+    A problem with so many sweeps allowed is worth `worth` times their cost. It costs too much if that pays for fewer
+    than `fewest` iterations. This is known before much is computed.
     """
     first, last, begin, end = part
     contacts, worth = (last - first) * _CONTACT_COST, worth * sweeps * (last - first) * _SWEEP_COST

@@ -59,7 +59,7 @@ def _save_snapshot(slot, world, kept, memory, report, many, counts):
 
 @inlined
 def _restore_snapshot(slot, world, kept, memory, report, many, counts):
-    """Restore the saved state of the world, except the work counted by the report.
+    """Restore the saved state of the world, except the counts of the report.
 
     Events logged since then are dropped: their rows are overwritten.
     """
@@ -86,7 +86,7 @@ def _body_error(b, offset_frame, kept, many):
 
     The speed counts as at least the speed that the body's loads give it over its radius.
     """
-    body = many.bodies.work[b]
+    body = many.bodies.body[b]
     x, q, v, L = read_state(many.bodies.state, b)
     y, p, u, K = read_state(kept.state[SNAPSHOT_COARSE], b)
     way, r = subtract(x, y), body.radius
@@ -117,7 +117,7 @@ def _max_body_error(offset_frame, kept, many):
 def _step_part(world, start, h, switches, records, many):
     """Take one part of h [s], `start` [s] after the call."""
     for b in range(many.bodies.state.shape[0]):
-        set_clock(start, many.bodies.work[b])
+        set_clock(start, many.bodies.body[b])
         many.bodies.touched[b] = 0
     substep_world(world, start, h, switches, None, records, many)
 
@@ -154,7 +154,7 @@ def _min_load_speed(h, many):
     """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
-        least = min(least, many.bodies.work[b].acceleration * h)
+        least = min(least, many.bodies.body[b].acceleration * h)
     return least
 
 

@@ -67,8 +67,8 @@ def write_spin_bounds(h, offset_frame, many):
         many.bodies.spin_bound[b] = 0.0
         w, r, push = (
             row_vector(many.bodies.twist, b, 3),
-            many.bodies.work[b].radius,
-            h * many.bodies.work[b].acceleration,
+            many.bodies.body[b].radius,
+            h * many.bodies.body[b].acceleration,
         )
         if r * r * (qt.dot(w, w) - limit) + push * push > 0.0:
             found = _write_spin_bound(b, h, least, offset_frame, many) or found
@@ -79,9 +79,9 @@ def write_spin_bounds(h, offset_frame, many):
 def _write_spin_bound(b, h, least, offset_frame, many):
     """Write `many.bodies.spin_bound` of one body; return whether it turns far."""
     _, q, _, L = read_state(many.bodies.state, b)
-    if not may_turn(L, h, least, offset_frame, many.bodies.work[b]):
+    if not may_turn(L, h, least, offset_frame, many.bodies.body[b]):
         return False
-    spin = spin_bound(q, L, h, offset_frame, many.bodies.work[b])
+    spin = spin_bound(q, L, h, offset_frame, many.bodies.body[b])
     if not spin * h > least:
         return False
     many.bodies.spin_bound[b] = spin
@@ -101,16 +101,16 @@ def _contact_side(b, y, n, offset_frame, many):
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if offset_frame is not None:
-        c = center_arm(R, many.bodies.work[b])
-    if not (many.bodies.work[b].shape == SPHERE and is_centred(offset_frame, many.bodies.work[b])):
-        m = qt.cross(n, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+        c = center_arm(R, many.bodies.body[b])
+    if not (many.bodies.body[b].shape == SPHERE and is_centred(offset_frame, many.bodies.body[b])):
+        m = qt.cross(n, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
 @inlined
 def _support(b, R, k, hulls, many):
     """Reach of body b along k from its geometric centre, in |k|."""
-    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
+    d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             e = qt.transposed_matvec(R, k)
@@ -140,10 +140,10 @@ def _norm(m):
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
     """Time within which the gap along n cannot close, at most `horizon` [s]."""
-    rate, turning = one[3], many.bodies.work[a].radius * _norm(one[4])
+    rate, turning = one[3], many.bodies.body[a].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
-        turning += many.bodies.work[b].radius * _norm(other[4])
+        turning += many.bodies.body[b].radius * _norm(other[4])
     gap = _gap_bound(0.0, a, b, n, (one, other), rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
@@ -176,14 +176,14 @@ def _turning_acceleration(b, h, offset_frame, many):
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
-        spin = spin_bound(q, L, h, offset_frame, many.bodies.work[b])
-    return turning_acceleration_bound(spin, q, L, h, offset_frame, many.bodies.work[b])
+        spin = spin_bound(q, L, h, offset_frame, many.bodies.body[b])
+    return turning_acceleration_bound(spin, q, L, h, offset_frame, many.bodies.body[b])
 
 
 @inlined
 def _load_acceleration(b, n, many):
     """Acceleration of body b along n [m/s²]."""
-    g = many.bodies.work[b].free_acceleration
+    g = many.bodies.body[b].free_acceleration
     return n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
 
 
@@ -218,9 +218,9 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
             gap = _gap_bound(0.0, a, b, n, (left, right), 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.bodies.spin_bound[a] > 0.0:
-                first = min(first, time_to_turn_far(n, one, offset_frame, many.bodies.work[a]))
+                first = min(first, time_to_turn_far(n, one, offset_frame, many.bodies.body[a]))
             if many.bodies.spin_bound[partner] > 0.0:
-                first = min(first, time_to_turn_far(n, other, offset_frame, many.bodies.work[partner]))
+                first = min(first, time_to_turn_far(n, other, offset_frame, many.bodies.body[partner]))
             if not gap > touch:
                 return first
         if not gap > touch:
@@ -232,9 +232,9 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
         gone += step
         if not gone < first:
             return first
-        one = fly(one, many.bodies.work[a], step, gyroscopic, offset_frame)
+        one = fly(one, many.bodies.body[a], step, gyroscopic, offset_frame)
         if b >= 0:
-            other = fly(other, many.bodies.work[b], step, gyroscopic, offset_frame)
+            other = fly(other, many.bodies.body[b], step, gyroscopic, offset_frame)
     return gone
 
 

@@ -54,7 +54,7 @@ def has_gained_energy(n, h, many):
         if many.bodies.touched[b] == 0:
             continue
         body, v_new, L_new = (
-            many.bodies.work[b],
+            many.bodies.body[b],
             row_vector(many.bodies.state, b, at.LINVEL),
             row_vector(many.bodies.state, b, at.ANGMOM),
         )
@@ -84,7 +84,7 @@ def update_twist(b, offset_frame, many):
     """Twist of body b from its momenta."""
     put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
     q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
-    put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+    put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], offset_frame))
 
 
 @kernel
@@ -103,7 +103,7 @@ def revert_to_dissipative(n, offset_frame, many):
 @inlined
 def work_against_loads(b, x, many):
     """Work against the loads of moving body b from x to its present place [J]."""
-    body, y = many.bodies.work[b], row_vector(many.bodies.state, b, at.POS)
+    body, y = many.bodies.body[b], row_vector(many.bodies.state, b, at.POS)
     return -body.mass * qt.dot(as_vector(body.free_acceleration), subtract(y, x))
 
 
@@ -111,7 +111,7 @@ def work_against_loads(b, x, many):
 def cap_rotational_energy(b, before, offset_frame, many):
     """Shorten the angular momentum of a turned body if ½L·I⁻¹L would have grown."""
     _, q, _, L = read_state(many.bodies.state, b)
-    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+    after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     if after > before + _FREE_ROTATION_SHARE * before:
         s = math.sqrt(before / after)
         put_vector(many.bodies.state, b, at.ANGMOM, (s * L[0], s * L[1], s * L[2]))
@@ -121,7 +121,7 @@ def cap_rotational_energy(b, before, offset_frame, many):
 def take_kinetic_energy(b, price, offset_frame, many):
     """Take a price [J] from the motion of body b, at most all of it."""
     _, q, v, L = read_state(many.bodies.state, b)
-    body = many.bodies.work[b]
+    body = many.bodies.body[b]
     kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
     s = math.sqrt(1.0 - price / kinetic) if price < kinetic else 0.0
     put_vector(many.bodies.state, b, at.LINVEL, (s * v[0], s * v[1], s * v[2]))
@@ -131,7 +131,7 @@ def take_kinetic_energy(b, price, offset_frame, many):
 @inlined
 def free_lift_work(b, many):
     """Work of a lift of body b that costs nothing [J]."""
-    body = many.bodies.work[b]
+    body = many.bodies.body[b]
     return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 
 
@@ -142,7 +142,7 @@ def clamp_body_inside_walls(b, many):
     Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,
     and its points then say nothing about the way of the centre.
     """
-    body, was_outside = many.bodies.work[b], False
+    body, was_outside = many.bodies.body[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])
     for k in range(many.walls.shape[0]):
         n, center = row_vector(many.walls, k, WALL_NORMAL), row_vector(many.bodies.center, b, 0)

@@ -76,9 +76,9 @@ def impact_speed_limit(k, h, many):
     as the error in the place of a meeting.
     """
     one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-    radius = many.bodies.work[one].radius
+    radius = many.bodies.body[one].radius
     if other >= 0:
-        radius = min(radius, many.bodies.work[other].radius)
+        radius = min(radius, many.bodies.body[other].radius)
     fast = _FAST_RADIUS_SHARE * radius / h
     if many.settings[0].is_error_controlled == 1:
         fast = min(fast, rest_speed_limit(k, h, many))
@@ -151,9 +151,9 @@ def _is_in_same_moment(k, many):
     a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
     if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):
         return True
-    radius = many.bodies.work[a].radius
+    radius = many.bodies.body[a].radius
     if b >= 0:
-        radius = min(radius, many.bodies.work[b].radius)
+        radius = min(radius, many.bodies.body[b].radius)
     way = max(-many.contacts.speed[k] * many.settings[0].substep, _SAME_MOMENT_RADII * radius)
     return gap <= many.settings[0].tolerance * way and (_pair_touches(k, 1, many) or _pair_touches(k, -1, many))
 
@@ -274,9 +274,9 @@ def time_to_first_impact(n, h, is_last, many):
             continue
         a, b, s = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], -many.contacts.speed[k]
         w = row_vector(many.bodies.twist, a, 3)
-        bound = relative_acceleration_bound(k, many) + TURNING_MARGIN * qt.dot(w, w) * many.bodies.work[a].radius
+        bound = relative_acceleration_bound(k, many) + TURNING_MARGIN * qt.dot(w, w) * many.bodies.body[a].radius
         if b >= 0:
             w = row_vector(many.bodies.twist, b, 3)
-            bound += TURNING_MARGIN * qt.dot(w, w) * many.bodies.work[b].radius
+            bound += TURNING_MARGIN * qt.dot(w, w) * many.bodies.body[b].radius
         first = min(first, 2.0 * many.contacts.gap[k] / (s + math.sqrt(s * s + 2.0 * bound * many.contacts.gap[k])))
     return first

@@ -56,7 +56,7 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
     write_state(
         many.bodies.state,
         b,
-        (add_scaled(x, h, v), drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, offset_frame), v, L),
+        (add_scaled(x, h, v), drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame), v, L),
     )
 
 
@@ -67,11 +67,11 @@ def _centripetal(b, k, first, side, h, many):
     It is 0 for a sphere, whose contact point does not turn, and where a body turns too far for it to describe the end
     of a stage of length h.
     """
-    shape, w = many.bodies.work[b].shape, row_vector(many.bodies.twist, b, 3)
+    shape, w = many.bodies.body[b].shape, row_vector(many.bodies.twist, b, 3)
     if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
         return (0.0, 0.0, 0.0)
     if shape == ELLIPSOID:
-        d, n = many.bodies.work[b].dims, row_vector(many.contacts.frame, k, 0)
+        d, n = many.bodies.body[b].dims, row_vector(many.contacts.frame, k, 0)
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return qt.cross(w, rate)
@@ -133,9 +133,9 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
         return
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.work[b])
+            hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.body[b])
         else:
-            hold_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.work[b])
+            hold_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.body[b])
 
 
 @inlined
@@ -143,10 +143,10 @@ def rest_residual(h, many):
     """Largest residual of the stage, whatever the tolerance allows; see `midpoint_step.rest_residual`."""
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
-        slop_speed = many.bodies.work[b].slop / h
+        slop_speed = many.bodies.body[b].slop / h
         if (
             many.bodies.touched[b] == 1
-            and many.settings[0].tolerance * many.bodies.work[b].acceleration * h > slop_speed
+            and many.settings[0].tolerance * many.bodies.body[b].acceleration * h > slop_speed
         ):
             least = min(least, CREEP_SLOP_SHARE * slop_speed)
     return least
@@ -158,7 +158,7 @@ def max_load_speed(h, many):
     most = 0.0
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            most = max(most, many.bodies.work[b].acceleration * h)
+            most = max(most, many.bodies.body[b].acceleration * h)
     return most
 
 
@@ -174,13 +174,13 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
             write_state(
                 many.bodies.state,
                 b,
-                integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.work[b]),
+                integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.body[b]),
             )
             continue
         drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
         update_body_pose(b, switches.flight.offset_frame, many)
         _, q, _, L = read_state(many.bodies.state, b)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], switches.flight.offset_frame))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], switches.flight.offset_frame))
     if n == 0:
         kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
@@ -188,7 +188,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     set_resting_targets(n, h, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            body = many.bodies.work[b]
+            body = many.bodies.body[b]
             a, torque = as_vector(body.free_acceleration), as_vector(body.torque)
             save_pre_load_velocity(b, row_vector(many.bodies.state, b, at.LINVEL), many)
             put_vector(many.bodies.state, b, at.LINVEL, add_scaled(row_vector(many.bodies.state, b, at.LINVEL), h, a))
@@ -221,6 +221,6 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
 def midpoint_step(n, world, h, switches, sleep, records, many):
     """Advance every body by h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
-    note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.work[0])
+    note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.body[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)
-    limit_world_energy_gain(h, 0, switches.flight.offset_frame, many.bodies, many.bodies.work[0])
+    limit_world_energy_gain(h, 0, switches.flight.offset_frame, many.bodies, many.bodies.body[0])

@@ -65,8 +65,8 @@ def _depth_after(k, h, many):
 @inlined
 def _smallest_half_width(b, many):
     """Smallest half-width of body b [m]; of a hull that of the block with its `dimensions`."""
-    d = many.bodies.work[b].dims
-    if many.bodies.work[b].shape == SPHERE:
+    d = many.bodies.body[b].dims
+    if many.bodies.body[b].shape == SPHERE:
         return d[0]
     return min(d[0], min(d[1], d[2]))
 
@@ -96,7 +96,7 @@ def _moves_as_foreseen(a, b, gap, n, h, many):
         c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
         if (c != a or d != b) and (c in (a, b) or d in (a, b)):
             return False
-    one, other = many.bodies.work[a].free_acceleration, many.bodies.work[b].free_acceleration
+    one, other = many.bodies.body[a].free_acceleration, many.bodies.body[b].free_acceleration
     g = subtract(as_vector(one), as_vector(other))
     return 0.25 * h * h * h * h * qt.dot(g, g) < gap * gap
 
@@ -112,10 +112,10 @@ def _is_stopping(k, h, many):
 def _end_pose(b, h, gyroscopic, offset_frame, many):
     """(geometric centre, rotation) of body b after h of free motion at constant momenta."""
     x, q, v, L = read_state(many.bodies.state, b)
-    R = to_matrix(drift_attitude(q, L, many.bodies.work[b], h, gyroscopic, offset_frame))
+    R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
     x = add_scaled(x, h, v)
     if offset_frame is not None:
-        x = add_scaled(x, 1.0, center_arm(R, many.bodies.work[b]))
+        x = add_scaled(x, 1.0, center_arm(R, many.bodies.body[b]))
     return x, R
 
 
@@ -134,7 +134,7 @@ def _hull_holds_point(b, p, thinner, many):
 @inlined
 def _holds_point(b, p, thinner, hulls, many):
     """True if body b, thinned, holds point p in its frame."""
-    d, shape = many.bodies.work[b].dims, many.bodies.work[b].shape
+    d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             return _hull_holds_point(b, p, thinner, many)

@@ -151,8 +151,8 @@ def _keep_angular_momentum(n, many):
             continue
         u = subtract(row_vector(many.bodies.state, a, at.LINVEL), row_vector(many.bodies.state, b, at.LINVEL))
         turn = qt.cross(u, row_vector(many.contacts.frame, k, 0))
-        one = many.bodies.work[a].radius ** 2 / many.bodies.inv_mass[a]
-        on_a = p * one / (one + many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b])
+        one = many.bodies.body[a].radius ** 2 / many.bodies.inv_mass[a]
+        on_a = p * one / (one + many.bodies.body[b].radius ** 2 / many.bodies.inv_mass[b])
         on_b = p - on_a
         v, w = apply_body_inv_inertia(a, turn, many), apply_body_inv_inertia(b, turn, many)
         gain = on_a * qt.dot(turn, _spin(a, many)) + on_b * qt.dot(turn, _spin(b, many))
@@ -188,7 +188,7 @@ def _pay_for_spins(n, offset_frame, many):
 def _displace(b, offset_frame, many):
     """Move and turn body b by `many.bodies.twist`; return the work against its loads [J]."""
     x, q, v, L = read_state(many.bodies.state, b)
-    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+    start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
     x = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0))
     write_state(many.bodies.state, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))

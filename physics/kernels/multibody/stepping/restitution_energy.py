@@ -31,7 +31,7 @@ def _update_twists(offset_frame, many):
     for b in range(many.bodies.state.shape[0]):
         _, q, v, L = read_state(many.bodies.state, b)
         put_vector(many.bodies.twist, b, 0, v)
-        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+        put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], offset_frame))
 
 
 @kernel

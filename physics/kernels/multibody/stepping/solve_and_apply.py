@@ -49,8 +49,8 @@ def _balance_moments(k, a, b, p, many):
     x = add_scaled(row_vector(many.bodies.state, a, at.POS), 1.0, row_vector(many.contacts.arm, k, 0))
     y = add_scaled(row_vector(many.bodies.state, b, at.POS), 1.0, row_vector(many.contacts.arm, k, 3))
     moment = qt.cross(subtract(x, y), p)
-    one = many.bodies.work[a].radius ** 2 / many.bodies.inv_mass[a]
-    share = one / (one + many.bodies.work[b].radius ** 2 / many.bodies.inv_mass[b])
+    one = many.bodies.body[a].radius ** 2 / many.bodies.inv_mass[a]
+    share = one / (one + many.bodies.body[b].radius ** 2 / many.bodies.inv_mass[b])
     for body, part in ((a, share), (b, 1.0 - share)):
         L = row_vector(many.bodies.state, body, at.ANGMOM)
         put_vector(many.bodies.state, body, at.ANGMOM, add_scaled(L, -part, moment))

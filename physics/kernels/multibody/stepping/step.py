@@ -49,12 +49,12 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         return
     for b in range(bodies):
         i = world * bodies + b
-        bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.work[b])
+        bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.body[b])
         many.bodies.inv_mass[b] = params[i, at.INV_MASS]
-        bind_fields(params, i, switches.flight.scheme, many.bodies.work[b])
+        bind_fields(params, i, switches.flight.scheme, many.bodies.body[b])
         write_state(many.bodies.state, b, read_state(state, i))
         many.bodies.touched[b] = 0
-    lost = max(find_overloaded_body(many.bodies.work), find_nonfinite_body(many.bodies.state))
+    lost = max(find_overloaded_body(many.bodies.body), find_nonfinite_body(many.bodies.state))
     if lost >= 0:
         report_fault(world, lost, report)
         clear_warm_start(world, memory)
@@ -65,7 +65,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
             step_with_error_control(world, k * h, h, switches, kept, records, many)
         else:
             for b in range(bodies):
-                set_clock(k * h, many.bodies.work[b])
+                set_clock(k * h, many.bodies.body[b])
             substep_world(world, k * h, h, switches, sleep, records, many)
         lost = find_nonfinite_body(many.bodies.state)
         if lost >= 0:
@@ -80,11 +80,11 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
             write_state(state, world * bodies + b, read_state(many.bodies.state, b))
         if sleep is not None and is_world_asleep(world, bodies, sleep):
             break
-    report_unresolved_bodies(report, many.bodies, many.bodies.work[0])
+    report_unresolved_bodies(report, many.bodies, many.bodies.body[0])
     for b in range(bodies):
         i = world * bodies + b
         _, q, _, L = read_state(state, i)
-        put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.work[b], offset_frame))
+        put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.body[b], offset_frame))
 
 
 _advance_worlds = for_each_world(advance_world)

@@ -61,8 +61,8 @@ def record_penetration(n, world, memory, report, many):
         report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
         if is_start and many.contacts.bodies[k, 1] >= 0:
             radius = min(
-                many.bodies.work[many.contacts.bodies[k, 0]].radius,
-                many.bodies.work[many.contacts.bodies[k, 1]].radius,
+                many.bodies.body[many.contacts.bodies[k, 0]].radius,
+                many.bodies.body[many.contacts.bodies[k, 1]].radius,
             )
             if depth > OVERLAP_SHARE * radius:
                 report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
@@ -126,7 +126,7 @@ def substep_world(
         midpoint_step(n, world, t, switches, sleep, records, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
-            advance_clock(t, many.bodies.work[b])
+            advance_clock(t, many.bodies.body[b])
         if n > 0:
             correct_positions(n, switches.flight.offset_frame, many)
         if is_last or not left > 0.0:

@@ -23,7 +23,7 @@ from physics.kernels.parallel.prepared_calls import reraise, run_job, run_jobs
 loop_kernel, perform_all = kernel, run_jobs  # decorator of a loop that makes calls, and how it makes those it is handed
 
 
-class PreparedWork:
+class PreparedCall:
     """Calls of kernels with all their arguments, made one after another in machine code.
 
     Parameters
@@ -82,9 +82,9 @@ class PreparedWork:
         """Offsets of the words of each argument of the first call."""
         return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
 
-    def then(self, other: PreparedWork) -> PreparedWork:
+    def then(self, other: PreparedCall) -> PreparedCall:
         """Join these calls with others after them; `put` changes the arguments of both."""
-        return PreparedWork([*self._calls, *other._calls], [*self._words, *other._words])
+        return PreparedCall([*self._calls, *other._calls], [*self._words, *other._words])
 
 
 @cache

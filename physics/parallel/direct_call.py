@@ -12,12 +12,12 @@ def loop_kernel(function: Callable) -> Callable:
     return function
 
 
-def perform_all(work: DirectWork, count: int) -> bool:
+def perform_all(call: DirectCall, count: int) -> bool:
     """Make all calls, whatever their `count`; False, or the exception that one raised."""
-    return work.perform()
+    return call.perform()
 
 
-class DirectWork:
+class DirectCall:
     """Calls of kernels with all their arguments.
 
     Parameters
@@ -36,7 +36,7 @@ class DirectWork:
         self._calls = [(code, list(arguments)) for code, arguments in calls]
 
     @property
-    def handed(self) -> tuple[DirectWork, int]:
+    def handed(self) -> tuple[DirectCall, int]:
         return self, len(self._calls)
 
     def perform(self) -> bool:
@@ -57,9 +57,9 @@ class DirectWork:
         """Replace an argument of the first call."""
         self._calls[0][1][argument] = value
 
-    def then(self, other: DirectWork) -> DirectWork:
+    def then(self, other: DirectCall) -> DirectCall:
         """Join these calls with others after them."""
-        return DirectWork([*self._calls, *other._calls])
+        return DirectCall([*self._calls, *other._calls])
 
 
 def entry(kernel: Callable, arguments: tuple) -> Callable:
