@@ -168,6 +168,10 @@ class FoldingBuilder(KernelBuilder):
         self._insert(made)
         return made
 
+    def ret(self, value):
+        """Leave the function with a value."""
+        return super().ret(_as_value(self, value))
+
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
         if _is(lhs, 1):
