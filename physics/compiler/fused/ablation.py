@@ -30,7 +30,6 @@ OPTIMISATIONS = {
     "scalars": "max, min, int and powers of numbers are written in place, not compiled as functions",
     "shared_kernels": "large kernels that know no plan are made machine code once for all plans",
     "simd_types": "an operation on lanes is one of vectors, not one for each lane",
-    "tuples": "`t[k]` asks for no exception, and `x in t` is written in place",
     "type_inference": "a constraint is looked at again only if a type in it has changed",
     "untimed_parts": "no clocks run while a part is compiled",
 }
@@ -43,9 +42,10 @@ BASES = {
     "code_libraries": "without it each caller optimises its parts once more: a first compile takes 2.8 times as long",
     "disk_cache": "what is kept on disk and loaded: shared kernels rest on it; `benchmarks.start` shows its worth",
     "dispatcher": "has kernels compiled: all others hook in there",
-    "operation_table": "asks `array_elements`, `ranges`, `scalars`, `simd_types` and `tuples`, which have switches",
+    "operation_table": "asks `array_elements`, `ranges`, `scalars` and `simd_types`, which have switches",
     "prepared_calls": "makes the calls that `prepared_entry` is the other end of",
     "prepared_entry": "threads take their calls from a table of prepared ones, and chained calls stand in it",
+    "tuples": "without it `t[k]` may raise: 55 kernels of a plan would return a status, and be lowered twice",
     "user_functions": "looks through users' functions before anything moves",
 }
 

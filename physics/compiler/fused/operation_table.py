@@ -16,7 +16,7 @@ from physics.compiler.fused.ablation import is_on
 _LOWERING = (
     *((array_elements,) if is_on("array_elements") else ()),
     *((ranges,) if is_on("ranges") else ()),
-    *((tuples,) if is_on("tuples") else ()),
+    tuples,
     *((scalars,) if is_on("scalars") else ()),
     simd_types,
 )
