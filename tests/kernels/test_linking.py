@@ -152,8 +152,10 @@ from numba.core.codegen import JITCodeLibrary
 import numpy as np
 import physics
 from physics import scenes
+from physics.compiler.fused.calling_convention import MayRaise
 
-optimised, lowered = collections.Counter(), collections.Counter()
+optimised, lowered, statuses = collections.Counter(), collections.Counter(), []
+MayRaise.__init__ = lambda self, name: statuses.append(name)
 optimise = JITCodeLibrary._optimize_final_module
 
 def counted(self):
@@ -174,7 +176,7 @@ if len(sys.argv) > 2:
 for _, what in recorder.buffer:
     if what.is_start:
         lowered[f"{what.data['dispatcher']} {what.data['args']}"] += 1
-print(json.dumps({"optimised": optimised, "lowered": lowered, "ends": ends}))
+print(json.dumps({"optimised": optimised, "lowered": lowered, "statuses": statuses, "ends": ends}))
 """
 
 
@@ -213,6 +215,9 @@ def test_a_contact_plan_is_optimised_once_and_compiled_once_for_all_processes(tm
     lines = ("if_declared", "if_law", "_as_solved", "_as_assembled", "_no_tangential_target", "law_parameter")
     again = {key: count for key, count in first["lowered"].items() if count > 1}
     assert not {key for key in again if not any(line in key for line in lines)}, again
+
+    # No kernel may raise an exception: it would be lowered twice, and so would all that call it.
+    assert first["statuses"] == []
 
     second = first_use("fast,balanced", tmp_path, "tower")
     assert second["optimised"] == {}

@@ -16,6 +16,7 @@ VARIABLE = "RIGID_ENV_WITHOUT"
 OPTIMISATIONS = {
     "argument_passing": "large tuples are handed on by address, not word by word",
     "array_elements": "elements of arrays are read and written directly, not by way of a copy of the array's words",
+    "calling_convention": "a kernel returns its value, not a status with the value in memory",
     "cold_kernels": "a call is left of what a step hardly ever needs",
     "folding_builder": "members of structures and constants are folded while instructions are written",
     "fused_products": "a product in a sum is rounded with it; the last bits of results depend on it",
@@ -38,7 +39,6 @@ OPTIMISATIONS = {
 BASES = {
     "atomics": "instructions by which threads share worlds",
     "backend": "the interface of the decorators",
-    "calling_convention": "the short way to hand an exception on; `user_functions` rests on the line that it names",
     "cache_files": "files of machine code: no optimisation, and all that is kept on disk rests on it",
     "code_libraries": "without it each caller optimises its parts once more: a first compile takes 2.8 times as long",
     "disk_cache": "what is kept on disk and loaded: shared kernels rest on it; `benchmarks.start` shows its worth",
@@ -46,6 +46,7 @@ BASES = {
     "operation_table": "asks `array_elements`, `ranges`, `scalars` and `simd_types`, which have switches",
     "prepared_calls": "makes the calls that `prepared_entry` is the other end of",
     "prepared_entry": "threads take their calls from a table of prepared ones, and chained calls stand in it",
+    "tuples": "without it `t[k]` may raise: 55 kernels of a plan would return a status, and be lowered twice",
     "user_functions": "looks through users' functions before anything moves",
 }
 

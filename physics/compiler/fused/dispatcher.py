@@ -42,7 +42,7 @@ from numba.core.typed_passes import NativeLowering
 from physics.compiler.fused.ablation import is_on
 from physics.compiler.fused.code_libraries import KernelOrigin, PartLibrary, SharedLibrary, WholeLibrary
 from physics.compiler.fused.disk_cache import SharedCache, WholeCache, register_library
-from physics.compiler.fused.lowering import KernelLowering, UserLowering
+from physics.compiler.fused.lowering import PartLowering, UserLowering, WholeLowering
 from physics.compiler.fused.memoised_contexts import MemoisedTarget, memoised
 from physics.compiler.fused.passes import kernel_passes, numbas_passes
 
@@ -71,7 +71,7 @@ class _WholeCompiler(CompilerBase):
 
     def passes(self) -> PassManager:
         """Passes that are run one after another."""
-        return kernel_passes(self.state, KernelLowering)
+        return kernel_passes(self.state, WholeLowering)
 
     def define_pipelines(self):
         state = self.state
@@ -111,7 +111,7 @@ class _PartCompiler(_WholeCompiler):
             self.state.flags.forceinline = False
 
     def passes(self):
-        return kernel_passes(self.state, KernelLowering, _KeepAsPart)
+        return kernel_passes(self.state, PartLowering, _KeepAsPart)
 
 
 class _SharedCompiler(_PartCompiler):

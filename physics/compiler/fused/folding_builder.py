@@ -162,11 +162,9 @@ class FoldingBuilder(KernelBuilder):
         """One of two values."""
         return super().select(cond, _as_value(self, lhs), _as_value(self, rhs), *more, **named)
 
-    def phi(self, typ, name="", flags=()):
-        """Value that depends on the block that control comes from."""
-        made = _Phi(self, typ, name, flags)
-        self._insert(made)
-        return made
+    def ret(self, value):
+        """Leave the function with a value."""
+        return super().ret(_as_value(self, value))
 
     def mul(self, lhs, rhs, name="", flags=()):
         """Product of integers."""
@@ -187,19 +185,6 @@ class FoldingBuilder(KernelBuilder):
         if _is_number(lhs) and _is_number(rhs):
             return ir.Constant(lhs.type, lhs.constant + rhs.constant)
         return super().add(lhs, rhs, name, flags)
-
-
-class _Phi(ir.PhiInstr):
-    """Phi node whose values may be structures."""
-
-    def __init__(self, builder, typ, name, flags):
-        super().__init__(builder.block, typ, name, flags)
-        self._builder = builder
-
-    def add_incoming(self, value, block):
-        """Add the value for control that comes from a block."""
-        with self._builder.goto_block(block):
-            super().add_incoming(_as_value(self._builder, value), block)
 
 
 def kernel_builder(block: ir.Block) -> KernelBuilder:

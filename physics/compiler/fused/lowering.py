@@ -18,6 +18,7 @@ from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
 from physics.compiler.fused.ablation import is_on
+from physics.compiler.fused.calling_convention import MayRaise, ValueDescriptor
 from physics.compiler.fused.folding_builder import kernel_builder, stack_slot
 from physics.compiler.fused.prepared_entry import write_prepared_entry
 
@@ -96,6 +97,15 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
             return context.cast(builder, value, sig.return_type, resty)
 
 
+class _ValueLower(_KernelLower):
+    """Lowering of a function that returns its value instead of a status."""
+
+    def setup_function(self, fndesc):
+        """Declare the function."""
+        fndesc.__class__ = ValueDescriptor
+        super().setup_function(fndesc)
+
+
 class _UserLower(Lower):
     """Lowering of a user's function, which tracks the present statement for exceptions."""
 
@@ -114,8 +124,28 @@ class UserLowering(NativeLowering):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class KernelLowering(NativeLowering):
-    """Pass that lowers a kernel."""
+class WholeLowering(NativeLowering):
+    """Pass that lowers a kernel for calls from Python."""
 
-    _name = "kernel_lowering"
+    _name = "whole_lowering"
     lowering_class = _KernelLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(WholeLowering):
+    """Pass that lowers a kernel for calls from other kernels."""
+
+    _name = "part_lowering"
+    lowering_class = _ValueLower
+
+    def run_pass(self, state):
+        """Lower a kernel; one that may raise an exception returns a status, as do all with checked indices."""
+        if is_on("calling_convention") and not state.targetctx.enable_boundscheck:
+            try:
+                return super().run_pass(state)
+            except MayRaise:
+                pass
+        return WholeLowering.run_pass(_WITH_STATUS, state)
+
+
+_WITH_STATUS = WholeLowering()

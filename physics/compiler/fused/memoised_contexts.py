@@ -24,10 +24,10 @@ from numba.core.cpu import CPUContext
 from numba.core.imputils import user_function
 from numba.extending import models, register_model
 
+from physics.compiler.fused import calling_convention
 from physics.compiler.fused.ablation import is_on
 from physics.compiler.fused.argument_passing import Arguments
 from physics.compiler.fused.array_elements import array_in_record, record_in_record
-from physics.compiler.fused.calling_convention import KernelCallConv, call_kernel
 from physics.compiler.fused.folding_builder import KernelBuilder
 from physics.compiler.fused.operation_table import lowering_of, signature_of
 
@@ -185,7 +185,13 @@ class MemoisedTarget(CPUContext):
     @property
     def call_conv(self):
         """Calling convention of functions."""
-        return KernelCallConv(self)
+        return calling_convention.ValueCallConv(self)
+
+    def declare_function(self, module, fndesc):
+        """Declare a function in a module that defines or calls it."""
+        if calling_convention.returns_value(fndesc):
+            return calling_convention.declare_value_function(self, module, fndesc)
+        return super().declare_function(module, fndesc)
 
     def get_arg_packer(self, fe_args):
         """Packer of the words of a call's arguments."""
@@ -214,8 +220,9 @@ class MemoisedTarget(CPUContext):
         """Register the entry point and the calls of a kernel."""
 
         def call(context, builder, sig, args):
-            if isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional):
-                return call_kernel(context, builder, fndesc, args)
+            is_kernel = isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional)
+            if is_kernel or calling_convention.returns_value(fndesc):
+                return calling_convention.call_value_function(context, builder, fndesc, args)
             return numbas_call(context, builder, sig, args)
 
         numbas_call = user_function(fndesc, libs)

@@ -10,12 +10,13 @@ from collections.abc import Callable
 
 from numba.core import types, typing
 
-from physics.compiler.fused import array_elements, ranges, scalars, simd_types
+from physics.compiler.fused import array_elements, ranges, scalars, simd_types, tuples
 from physics.compiler.fused.ablation import is_on
 
 _LOWERING = (
     *((array_elements,) if is_on("array_elements") else ()),
     *((ranges,) if is_on("ranges") else ()),
+    tuples,
     *((scalars,) if is_on("scalars") else ()),
     simd_types,
 )
