@@ -99,12 +99,12 @@ def _decades(residual: np.ndarray) -> list[int]:
 # --- random contacts ---------------------------------------------------------------------------------------------
 
 
-def run_batch(family: str, preset: str, seed: int, found: dict, worlds: int = WORLDS) -> None:
+def run_batch(family: str, preset: str, seed: int, found: dict) -> None:
     """Step the next batch of a family, and add it to `found`."""
     effects, is_round, _ = FAMILIES[family]
     batch, accuracy = found["batches"], with_pivoting(preset)
     place = list(FAMILIES).index(family), list(physics.PRESETS).index(preset), batch
-    drawn = draw(np.random.default_rng([seed, *place]), effects, is_round, worlds)
+    drawn = draw(np.random.default_rng([seed, *place]), effects, is_round, WORLDS)
     found["batches"] += 1
     if drawn is None:
         found["refused"] += 1
