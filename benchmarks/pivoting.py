@@ -12,8 +12,10 @@ Ctrl-C ends it early; the same command goes on from the file of results.
 
 from __future__ import annotations
 
+import itertools
 import json as json_module
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
@@ -32,7 +34,10 @@ from rigid_env.terminal import Column, Table, make_console, number_columns, prog
 
 WORLDS = 400
 STEPS = 5  # of a batch: the first without a warm start
+SAVED = 5  # batches between two writes of the result
 KEPT = 5  # places of the largest gains, of each family and preset
+
+RESULT = machine.RESULTS / "pivoting.json"
 
 # Bounds of what rattles or cannot be solved, for the time a run takes.
 MOST_IMPACTS, MOST_ITERATIONS = 200, 2000
@@ -196,6 +201,26 @@ def jobs(family: list[str] | None, preset: list[str] | None) -> list[tuple[str, 
     ]
 
 
+def random_steps(found: dict, todo: list[tuple[str, str]], count: int, seed: int) -> Iterator[tuple[str, float]]:
+    """Run random contacts, `SAVED` batches at a time: what was run, and the share that is done."""
+    for k, (name, level) in enumerate(todo):
+        one, wanted = found["random"].setdefault(f"{name}, {level}", empty()), count / len(todo)
+        while problems(one) < wanted:
+            for _ in range(SAVED):
+                if problems(one) < wanted:
+                    run_batch(name, level, seed, one)
+            yield f"{name}, {level}", (k + min(1.0, problems(one) / wanted)) / len(todo)
+
+
+def case_steps(found: dict, presets: Sequence[str]) -> Iterator[tuple[str, float]]:
+    """Run hard cases one by one: what was run, and the share that is done."""
+    for k, (level, case) in enumerate(itertools.product(presets, registry.CASES)):
+        cases = found["hard_cases"].setdefault(level, {})
+        if case.run is not None and case.name not in cases:
+            cases[case.name] = run_case(case, level)
+            yield f"{case.name}, {level}", k / (len(presets) * len(registry.CASES))
+
+
 def read(path: Path, seed: int) -> dict:
     """Result of an earlier run that this one goes on with; nothing where there is no file."""
     if not path.exists():
@@ -212,9 +237,8 @@ def table(found: dict) -> Table:
     made = Table([Column("worlds"), Column("kind"), *number_columns(*(name.replace("_", " ") for name in names))])
     rows = [(run, kind, found["random"][run][kind]) for run in found["random"] for kind in ("ordinary", "extreme")]
     for preset, cases in found["hard_cases"].items():
-        rows.append(
-            (f"hard cases, {preset}", f"{len(cases)} cases", {n: sum(c[n] for c in cases.values()) for n in names})
-        )
+        counts = {name: sum(case[name] for case in cases.values()) for name in names}
+        rows.append((f"hard cases, {preset}", f"{len(cases)} cases", counts))
     for run, kind, counts in rows:
         made.add_row(run, kind, *(f"{counts[name]:,}" for name in names))
     return made
@@ -226,35 +250,22 @@ def main(
     family: Annotated[list[str] | None, typer.Option(help=f"Some of: {'; '.join(FAMILIES)}.")] = None,
     preset: Annotated[list[str] | None, typer.Option(help=f"Some of {', '.join(physics.PRESETS)}.")] = None,
     hard_cases: Annotated[bool, typer.Option("--hard-cases", help="Instead of random contacts.")] = False,
-    json: Annotated[Path, typer.Option(metavar="FILE", help="Result, gone on with.")] = machine.RESULTS
-    / "pivoting.json",
+    json: Annotated[Path, typer.Option(metavar="FILE", help="Result, gone on with.")] = RESULT,
 ) -> None:
     """Count contact problems, tries of pivoting, and those it won."""
     console, found = make_console(), read(json, seed)
     console.print(machine.headline())
-    todo = jobs(family, preset)
-    total = len(registry.CASES) * len(preset or SOME) if hard_cases else count
+    steps = case_steps(found, preset or SOME) if hard_cases else random_steps(found, jobs(family, preset), count, seed)
     with progress_bar(console) as progress:
-        task = progress.add_task("", total=total)
+        task = progress.add_task("", total=100)
         try:
-            for level in preset or SOME if hard_cases else ():
-                cases = found["hard_cases"].setdefault(level, {})
-                for case in registry.CASES:
-                    progress.update(task, description=f"{case.name}, {level}")
-                    if case.run is not None and case.name not in cases:
-                        cases[case.name] = run_case(case, level)
-                        write_json(json, found)
-                    progress.advance(task)
-            for name, level in () if hard_cases else todo:
-                one = found["random"].setdefault(f"{name}, {level}", empty())
-                while problems(one) < count / len(todo):
-                    run_batch(name, level, seed, one)
-                    progress.update(
-                        task, description=f"{name}, {level}", completed=sum(map(problems, found["random"].values()))
-                    )
+            for label, share in steps:
+                progress.update(task, description=label, completed=100 * share)
+                if not console.is_terminal:
+                    console.print(f"{share:4.0%} {label}")
                 write_json(json, found)
         except KeyboardInterrupt:
-            write_json(json, found)
+            console.print("ended early; the same command goes on")
     console.print(table(found))
     console.print(f"written to {json}")
 

@@ -21,8 +21,9 @@ NAMES = tuple(name for name in pivoting.tally() if name != "decades")
 
 @pytest.fixture(autouse=True)
 def _small_runs(monkeypatch):
-    monkeypatch.setattr(pivoting, "WORLDS", 6)
+    monkeypatch.setattr(pivoting, "WORLDS", 3)
     monkeypatch.setattr(pivoting, "MOST_ITERATIONS", 20)
+    monkeypatch.setattr(pivoting, "MOST_IMPACTS", 2)
 
 
 def run(*arguments: str):
