@@ -26,7 +26,10 @@ DEEPEST = 5e-3  # into a wall, of the bounding radius: half of what a world take
 # Of each draw: friction of any user, small, large, none.
 KINDS_OF_FRICTION = (0.5, 0.2, 0.25, 0.05)
 
-# Worlds of any user: μ and ratio of edges at most so large.
+# Ordinary bodies in corners of a box, as in the environments; ordinary bodies at other walls; all others.
+KINDS = ("box", "ordinary", "extreme")
+
+# Bodies of any user: μ and ratio of edges at most so large.
 ORDINARY_FRICTION, ORDINARY_RATIO = 1.0, 10.0
 
 
@@ -45,6 +48,8 @@ class Drawn:
         Force [N] and torque [N m], world frame.
     is_ordinary : (worlds,) bool
         μ is at most 1, and the edges at most 1 : 10.
+    is_box : bool
+        Walls meet at right angles.
     """
 
     scene: physics.Scene
@@ -53,6 +58,13 @@ class Drawn:
     parameters: dict
     wrench: np.ndarray
     is_ordinary: np.ndarray
+    is_box: bool
+
+    @property
+    def kinds(self) -> dict[str, np.ndarray]:
+        """Worlds (worlds,) bool of each of `KINDS`."""
+        kinds = self.is_ordinary & self.is_box, self.is_ordinary & (not self.is_box), ~self.is_ordinary
+        return dict(zip(KINDS, kinds))
 
     def start(self, accuracy: physics.Accuracy) -> physics.World:
         """Make the worlds at their beginning."""
@@ -104,8 +116,9 @@ def draw(rng: np.random.Generator, effects: Sequence, is_round: bool, worlds: in
     scene = _scene(normals, offsets, effects, is_round, size[0], pos[0], quat[0])
     ratio = size.max(axis=1) / size.min(axis=1)
     is_ordinary = (ratio <= ORDINARY_RATIO) & (parameters.get("friction", mass * 0)[..., 0] <= ORDINARY_FRICTION)
-    wrench = np.hstack([force, torque])[:, None]
-    return Drawn(scene, float(log_uniform(rng, -4, -1, ())), state, parameters, wrench, is_ordinary)
+    wrench, angles = np.hstack([force, torque])[:, None], normals @ normals.T
+    is_box = bool(np.abs(angles - np.eye(len(normals))).max() < 1e-9)
+    return Drawn(scene, float(log_uniform(rng, -4, -1, ())), state, parameters, wrench, is_ordinary, is_box)
 
 
 def draw_walls(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,7 @@ import typer
 
 import physics
 from benchmarks import machine
-from benchmarks.drawn_contacts import draw
+from benchmarks.drawn_contacts import KINDS, draw
 from physics.plan.plan import make_plan
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Setting, UnsupportedError
@@ -119,7 +119,7 @@ def run_batch(family: str, preset: str, seed: int, found: dict) -> None:
         off.restore(on.snapshot())
         on.step(drawn.wrench)
         off.step(drawn.wrench)
-        for kind, chosen in (("ordinary", drawn.is_ordinary), ("extreme", ~drawn.is_ordinary)):
+        for kind, chosen in drawn.kinds.items():
             won = compare(found[kind], on, off, chosen)
         gains = [
             [float(off.report.residual[w]), float(on.report.residual[w]), batch, step, w]
@@ -130,12 +130,12 @@ def run_batch(family: str, preset: str, seed: int, found: dict) -> None:
 
 def empty() -> dict:
     """Nothing found yet of a family at a preset."""
-    return {"batches": 0, "refused": 0, "ordinary": tally(), "extreme": tally(), "largest": []}
+    return {"batches": 0, "refused": 0, **{kind: tally() for kind in KINDS}, "largest": []}
 
 
 def problems(found: dict) -> int:
     """Contact problems of a family at a preset."""
-    return found["ordinary"]["problems"] + found["extreme"]["problems"]
+    return sum(found[kind]["problems"] for kind in KINDS)
 
 
 # --- hard cases --------------------------------------------------------------------------------------------------
@@ -235,7 +235,7 @@ def table(found: dict) -> Table:
     """Counts of all families, then of the hard cases."""
     names = [name for name in tally() if name != "decades"]
     made = Table([Column("worlds"), Column("kind"), *number_columns(*(name.replace("_", " ") for name in names))])
-    rows = [(run, kind, found["random"][run][kind]) for run in found["random"] for kind in ("ordinary", "extreme")]
+    rows = [(run, kind, found["random"][run][kind]) for run in found["random"] for kind in KINDS]
     for preset, cases in found["hard_cases"].items():
         counts = {name: sum(case[name] for case in cases.values()) for name in names}
         rows.append((f"hard cases, {preset}", f"{len(cases)} cases", counts))
