@@ -32,9 +32,9 @@ from rigid_env.hard_cases.case import Setting, UnsupportedError
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.terminal import Column, Table, make_console, number_columns, progress_bar, run_program
 
-WORLDS = 400
+WORLDS = 100
 STEPS = 5  # of a batch: the first without a warm start
-SAVED = 5  # batches between two writes of the result
+SAVED = 10  # batches between two writes of the result
 KEPT = 5  # places of the largest gains, of each family and preset
 
 RESULT = machine.RESULTS / "pivoting.json"
