@@ -104,7 +104,7 @@ class GoalTask(Task):
         return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
 
     def compute_terminated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Whether an episode would end by achieving one goal where another is wanted.
+        """Say whether an episode would end by achieving one goal where another is wanted.
 
         Arguments and errors as of `compute_reward`.
 
@@ -116,7 +116,7 @@ class GoalTask(Task):
         return (self._shortfall(achieved_goal, desired_goal) <= 1.0) & self.ends_on_success
 
     def compute_truncated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Whether goals end an episode before its time, (...,) bool: none does, only the limit of steps.
+        """Say whether goals end an episode before its time, (...,) bool: none does, only the limit of steps.
 
         Arguments and errors as of `compute_reward`.
         """

@@ -119,7 +119,7 @@ class _Cache:
 
 @cache
 def _place_of(source: Path) -> bytes:
-    """What tells a source from others of the same content: of our packages, what stands around it and not where.
+    """Tell a source from others of the same content: of our packages, by what stands around it and not by its place.
 
     `cache_folder.folder_name` has a digest of what stands around most kernels of `physics`.
     """
