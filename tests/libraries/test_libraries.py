@@ -1,0 +1,87 @@
+"""Libraries that train on our environments: each takes some steps on them (docs/libraries.md).
+
+None of them is an extra of ours: a test is skipped where its library is not installed.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import rigid_env  # noqa: F401 (registers)
+
+REACH = "rigid_env/BlockReach-v0"
+WORLDS = 4
+
+pytestmark = pytest.mark.exhaustive
+
+
+def batch(mode: str, **arguments):
+    """The native batch, in a mode of starting anew."""
+    return gym.make_vec(
+        REACH, num_envs=WORLDS, vectorization_mode="vector_entry_point", autoreset_mode=mode, **arguments
+    )
+
+
+def test_torchrl_takes_an_id_processes_and_the_native_batch():
+    pytest.importorskip("torchrl")
+    from torchrl.envs import ParallelEnv
+    from torchrl.envs.libs.gym import GymEnv, GymWrapper
+    from torchrl.envs.utils import check_env_specs
+
+    env = GymEnv(REACH)
+    check_env_specs(env)
+    assert env.rollout(5).shape == (5,)
+    assert GymWrapper(batch("Disabled")).rollout(5, break_when_any_done=False).shape == (WORLDS, 5)
+    workers = ParallelEnv(2, partial(GymEnv, f"rigid_env:{REACH}"))  # a process imports the module
+    assert workers.rollout(3).shape == (2, 3)
+    workers.close()
+
+
+def test_skrl_takes_the_native_batch():
+    pytest.importorskip("skrl")
+    import torch
+    from skrl.envs.wrappers.torch import wrap_env
+
+    env = wrap_env(batch("SameStep", max_episode_steps=3), wrapper="gymnasium")
+    observations, _ = env.reset()
+    assert observations.shape == (WORLDS, 24)
+    for _ in range(5):
+        observations, rewards, terminated, truncated, _ = env.step(torch.zeros(WORLDS, 6))
+        assert observations.shape == (WORLDS, 24)
+        assert rewards.shape == terminated.shape == truncated.shape == (WORLDS, 1)
+
+
+@pytest.mark.parametrize(("name", "policy"), [("TRPO", "MlpPolicy"), ("RecurrentPPO", "MlpLstmPolicy")])
+def test_sb3_contrib_trains_on_the_native_batch(name, policy):
+    contrib = pytest.importorskip("sb3_contrib")
+    from rigid_env import RigidVecEnv
+
+    model = getattr(contrib, name)(policy, RigidVecEnv(batch("SameStep")), n_steps=16, batch_size=64, device="cpu")
+    assert model.learn(128).num_timesteps == 128
+
+
+def test_a_minari_data_set_has_the_bits_of_the_episodes(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("h5py")
+    pytest.importorskip("jax")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    env = minari.DataCollector(gym.make(REACH, max_episode_steps=20))
+    env.action_space.seed(0)
+    seen = []
+    for seed in range(2):
+        seen.append([env.reset(seed=seed)[0]])
+        is_over = False
+        while not is_over:
+            observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
+            seen[-1].append(observation)
+            is_over = terminated or truncated
+    env.create_dataset("rigid/reach/random-v0", algorithm_name="random")
+    kept = minari.load_dataset("rigid/reach/random-v0")
+    assert kept.total_episodes == 2
+    for episode, observations in zip(kept.iterate_episodes(), seen):
+        np.testing.assert_array_equal(episode.observations, np.array(observations))
+    assert kept.recover_environment().unwrapped.spec.id == REACH
