@@ -31,7 +31,7 @@ from rigid_env.cli.files import output_option
 from rigid_env.cli.names import checked_preset
 from rigid_env.envs.making import make_task
 from rigid_env.envs.named import make_named
-from rigid_env.tasks.restoring import put
+from rigid_env.tasks.restoring import reinstate
 from rigid_env.tasks.rollout import rollout
 from rigid_env.tasks.state import TaskState
 from rigid_env.terminal import Column, Table, make_console, number_columns, run_program
@@ -165,7 +165,7 @@ class Planner:
         state = replace(state, generators=(own,) * state.worlds)  # those of the environment would foretell its pushes
         if not is_disturbed:
             return rollout(self.model, actions, initial=state).returns
-        put(self.model, {}, state)
+        reinstate(self.model, {}, state)
         self.model.disturbed.wait_anew()
         return rollout(self.model, actions).returns
 

@@ -22,7 +22,7 @@ from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.describe import Section, markdown, sections
 from rigid_env.tasks.layout import FAILURE, REWARD
-from rigid_env.tasks.restoring import put, take
+from rigid_env.tasks.restoring import capture, reinstate
 from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import shaped
 
@@ -125,10 +125,10 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
     def _remember_generator(self) -> Undo:
         kept = self._np_random, self._np_random_seed, self.task.generators[0]
 
-        def put_back() -> None:
+        def undo() -> None:
             self._np_random, self._np_random_seed, self.task.generators[0] = kept
 
-        return put_back
+        return undo
 
     def step(self, action: ArrayLike) -> tuple[Obs, float, bool, bool, dict[str, Any]]:
         """Hold an action for one control step; see `gymnasium.Env.step`.
@@ -163,7 +163,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
             if not self._has_reset:
                 raise self._not_ready("step")
             task = self.task
-            task.take(shaped(action, self._action_shape, "action"))
+            task.apply(shaped(action, self._action_shape, "action"))
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":
@@ -192,7 +192,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         TaskState
             ``save(path)`` writes it, `rigid_env.TaskState.load` reads it.
         """
-        return take(self.task, self._arrays(), [self._np_random_seed])
+        return capture(self.task, self._arrays(), [self._np_random_seed])
 
     @exclusive
     def set_state(self, state: TaskState, source: int = 0) -> None:
@@ -212,7 +212,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
             has no such world. Nothing has changed then.
         """
         arrays = self._arrays()
-        put(self.task, arrays, state, source=None if source == 0 and getattr(state, "worlds", 0) == 1 else source)
+        reinstate(self.task, arrays, state, source=None if source == 0 and getattr(state, "worlds", 0) == 1 else source)
         self._np_random, self._np_random_seed = self.task.generators[0], state.seeds[source]
         self._has_reset, self._is_closed = not arrays["waiting"][0], False
 

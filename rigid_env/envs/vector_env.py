@@ -27,7 +27,7 @@ from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.arguments import takes
 from rigid_env.tasks.options import require_known
-from rigid_env.tasks.restoring import put, remember, take
+from rigid_env.tasks.restoring import capture, reinstate, remember
 from rigid_env.tasks.state import TaskState
 
 Step = tuple[Obs, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
@@ -173,14 +173,14 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             Actions of another shape, or that are not finite numbers. Nothing has changed then.
         """
         self._check_ready()
-        put_back_memory = self._remember()
+        undo_memory = self._remember()
         kept = self._generators_of_ended()
         self.task.step(actions)
         for generator, state in kept:
             generator.bit_generator.state = state
-        if put_back_memory is None:
+        if undo_memory is None:
             return self._conclude()
-        with undo_on_error(self.task.take_back, put_back_memory):  # an error of a start, or of a picture
+        with undo_on_error(self.task.undo_step, undo_memory):  # an error of a start, or of a picture
             return self._conclude()
 
     def _conclude(self) -> Step[Obs]:
@@ -231,7 +231,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         ValueError
             A world that is not there, or named twice.
         """
-        return take(self.task, self._arrays(), self._seeds, worlds)
+        return capture(self.task, self._arrays(), self._seeds, worlds)
 
     @exclusive
     def set_state(
@@ -254,7 +254,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             It is no state, one of another task or of other settings (`TaskState.settings`; both values are told), or
             indices are out of range. Nothing has changed then.
         """
-        chosen, sources = put(self.task, self._arrays(), state, worlds, source)
+        chosen, sources = reinstate(self.task, self._arrays(), state, worlds, source)
         for world, of in zip(chosen.tolist(), sources.tolist()):
             self._seeds[world] = state.seeds[of]
 
@@ -291,10 +291,10 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     def _remember_generators(self) -> Undo:
         kept = list(self.task.generators), list(self._seeds)
 
-        def put_back() -> None:
+        def undo() -> None:
             self.task.generators[:], self._seeds[:] = kept
 
-        return put_back
+        return undo
 
     def _remember(self) -> Undo | None:
         """Copy the environment's own memory, where code of a user may end with an error."""
@@ -302,17 +302,17 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             return None
         ended, pictures = self._ended, {name: array.copy() for name, array in self._source.arrays.items()}
 
-        def put_back() -> None:
+        def undo() -> None:
             self._ended = ended
             for name, array in pictures.items():
                 self._source.arrays[name][...] = array
 
-        return put_back
+        return undo
 
     def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
         """Start episodes; after an error nothing has changed."""
-        put_back_task = remember(self.task, rows) if self.task.may_fail and self._source.arrays else None
-        with undo_on_error(put_back_task, self._remember()):
+        undo_task = remember(self.task, rows) if self.task.may_fail and self._source.arrays else None
+        with undo_on_error(undo_task, self._remember()):
             self.task.start(rows, options)
             self._source.start(rows)
         self._ended[rows] = False

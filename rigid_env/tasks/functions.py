@@ -10,8 +10,8 @@ import numpy as np
 
 from physics.undo import undo_on_error
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.before import Before
 from rigid_env.tasks.named import Named
+from rigid_env.tasks.step_undo import StepUndo
 from rigid_env.tasks.task_parts import Called
 from rigid_env.tasks.worlds import Worlds
 
@@ -50,7 +50,7 @@ class Functions:
         if is_first:
             task.set_outcome(np.zeros_like(self._outcome))
         self._obs = np.zeros_like(task.obs)
-        self.before = Before(task)
+        self.undo = StepUndo(task)
 
     def _rehearse(self) -> None:
         """Call each function once in world 0, with values drawn for it; errors say that this is a rehearsal."""
@@ -115,7 +115,7 @@ class Functions:
         task.given[...] = actions
         if not np.isfinite(task.given).all():
             raise task.not_finite(int(np.flatnonzero(~np.isfinite(task.given).all(axis=1))[0]))
-        with undo_on_error(self.before.keep()):
+        with undo_on_error(self.undo.keep()):
             task.previous_action[...] = task.action
             np.clip(task.given, -1.0, 1.0, out=task.given)
             task.act()

@@ -16,7 +16,7 @@ from rigid_env.tasks.state_settings import check_settings
 OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
 
 
-def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], worlds=None) -> TaskState:
+def capture(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], worlds=None) -> TaskState:
     """Copy the state of a task.
 
     Parameters
@@ -49,14 +49,14 @@ def take(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], wo
     )
 
 
-def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, source=None) -> tuple:
+def reinstate(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, source=None) -> tuple:
     """Continue worlds of a task from a state; after an error nothing has changed.
 
     Parameters
     ----------
     task : Task
     arrays : mapping of str to (worlds, ...) array
-        As of `take`; they are written.
+        As of `capture`; they are written.
     state : TaskState
     worlds, source
         As of `physics.World.restore`.
@@ -92,12 +92,12 @@ def put(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=None, s
 
 def remember(task, rows: np.ndarray | None = None) -> Undo:
     """Copy a task, some worlds or all: to put it back is to go on from there."""
-    before = take(task, {}, [None] * task.worlds, rows)
+    before = capture(task, {}, [None] * task.worlds, rows)
 
-    def put_back() -> None:
-        put(task, {}, before, rows)
+    def undo() -> None:
+        reinstate(task, {}, before, rows)
 
-    return put_back
+    return undo
 
 
 def _indices(worlds: int, held: int, targets: restoring.Targets) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from physics.undo import undo_on_error
 from physics.world.batch_arrays import machine_memory
 from physics.world.report import Status, gravest
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.restoring import put, remember
+from rigid_env.tasks.restoring import reinstate, remember
 from rigid_env.tasks.rollout_steps import Kept, end_control
 from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import Task
@@ -145,7 +145,7 @@ def rollout(
     may_raise = task.compiled is None or task.world.plan.may_raise
     with undo_on_error(remember(task) if may_raise else None):
         if initial is not None:
-            put(task, {}, initial)
+            reinstate(task, {}, initial)
         if _needs_python(task):
             status = _one_by_one(task, actions, every, kept)
         else:

@@ -31,7 +31,7 @@ class Steps:
         To be written: command of all steps, force [N] and torque [N m].
     kick : (worlds, bodies, 6) float64
         To be written: command of the first step besides. The same array as `wrench` without impulses.
-    take : callable
+    advance : callable
         Takes the steps without a disturbance.
     has_first : bool
         The first step is one of its own, of which the world's report does not tell: see `note_first`.
@@ -44,12 +44,12 @@ class Steps:
         self.wrench = np.zeros((world.worlds, world.body_count, 6)) if has_impulses else self._last.wrench
         self.kick = np.zeros_like(self.wrench) if has_impulses else self.wrench
         self._early = np.zeros(world.worlds, dtype=np.int64)
-        self.take = self._take_with_impulses if has_impulses else self._last
+        self.advance = self._advance_with_impulses if has_impulses else self._last
 
-    def _take_with_impulses(self) -> None:
-        self.take_disturbed(None, None)
+    def _advance_with_impulses(self) -> None:
+        self.advance_disturbed(None, None)
 
-    def take_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
+    def advance_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
         """Take the steps under an extra load, and the first one under an extra push; neither is a command.
 
         Parameters

@@ -20,7 +20,6 @@ from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
-from rigid_env.tasks.before import Before
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
 from rigid_env.tasks.distribution import Distribution
@@ -32,11 +31,12 @@ from rigid_env.tasks.options import require_known
 from rigid_env.tasks.replacing import checked_effects
 from rigid_env.tasks.starts import Starts, distributions_of
 from rigid_env.tasks.state_settings import state_settings
+from rigid_env.tasks.step_undo import StepUndo
 from rigid_env.tasks.steps import Steps
 from rigid_env.tasks.wrenches import write_wrenches
 
 OF_PROCESS = (
-    "_before", "_functions", "_write_arguments", "_write_wrenches", "kept_arrays", "observed", "rollout_loop",
+    "_undo", "_functions", "_write_arguments", "_write_wrenches", "kept_arrays", "observed", "rollout_loop",
     "rollout_observers",
 )  # fmt: skip
 """Names of attributes left out of copies: machine code, and functions of the class."""
@@ -143,7 +143,7 @@ class Task(Starts):
         self.outcome = np.zeros((self.worlds, col.INFO + len(self.measures) + len(self.terms)))
         self._prepare()
         self._functions = None if self.compiled else Functions(self)
-        self._before = self._keeper()
+        self._undo = self._keeper()
         self.info_names = (*self.measures, *(f"reward_{term}" for term in self.terms))
         refuse_same_keys(type(self).__name__, self.info_names, self.drawn)
 
@@ -263,29 +263,29 @@ class Task(Starts):
             Actions of the wrong shape or not finite, or a function of the task that gives what it may not. Nothing has
             changed then.
         """
-        self.take(shaped(actions, self.action.shape, "actions"))
+        self.apply(shaped(actions, self.action.shape, "actions"))
 
-    def take(self, actions: np.ndarray) -> None:
+    def apply(self, actions: np.ndarray) -> None:
         """Take a `step` with an array of the right shape; the axis of a single world may be missing."""
         if actions.dtype.kind not in "fiub":
             raise ValueError(f"actions is {reprlib.repr(actions.tolist())}; allowed are numbers")
         if self._functions is not None:
             self._functions.step(actions)
             return
-        if self._before is not None:
-            self._before.keep()
+        if self._undo is not None:
+            self._undo.keep()
         self.given[...] = actions
         self.act()
 
-    def _keeper(self) -> Before | None:
+    def _keeper(self) -> StepUndo | None:
         if self._functions is not None:
-            return self._functions.before
-        return Before(self) if self.may_fail else None
+            return self._functions.undo
+        return StepUndo(self) if self.may_fail else None
 
-    def take_back(self) -> None:
+    def undo_step(self) -> None:
         """Restore the state before the last control step, after a start that raised an error."""
-        if self._before is not None:
-            self._before.put_back()
+        if self._undo is not None:
+            self._undo.undo()
 
     def not_finite(self, world: int) -> ValueError:
         """Error for an action in `given` that is not finite, with its world."""
@@ -298,9 +298,9 @@ class Task(Starts):
             raise self.not_finite(bad)
         advance = self._advance
         if self.disturbed is None:
-            advance.take()
+            advance.advance()
         else:
-            advance.take_disturbed(*self.disturbed.act())
+            advance.advance_disturbed(*self.disturbed.act())
         gravest(self.world.report_table, self.status)
         if advance.has_first:
             advance.note_first(self.status)
@@ -362,7 +362,7 @@ class Task(Starts):
         self.observed = Observation(self.observation)
         self._prepare()
         self._functions = None if self.compiled else Functions(self, is_first=False)
-        self._before = self._keeper()
+        self._undo = self._keeper()
 
     def observer(self, taken: np.ndarray) -> BoundCall:
         """Return the kernel that observes the worlds of a list, such as a thread has stepped."""

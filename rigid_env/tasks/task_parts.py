@@ -58,7 +58,7 @@ class Watched(Batched, Protocol):
 
 
 class Stepped(Watched, Protocol):
-    """Part that a control step changes, and `Before` puts back."""
+    """Part that a control step changes, and `StepUndo` restores."""
 
     clock: int
     generators: list[Any]  # numpy.random.Generator; None before the first episode

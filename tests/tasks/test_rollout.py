@@ -13,7 +13,7 @@ from rigid_env import BlockReach, BlockReachEnv, BlockReachGoal, BlockReorient, 
 from rigid_env.tasks import Gust, Impulse, Push, Task, Wrench
 from rigid_env.tasks import rollout as module
 from rigid_env.tasks.layout import FAILURE, REWARD, SUCCESS
-from rigid_env.tasks.restoring import put, take
+from rigid_env.tasks.restoring import capture, reinstate
 from rigid_env.tasks.state import TaskState
 from tests.physics.test_field_errors import Reaching
 from tests.tasks.conftest import Slide, started
@@ -54,7 +54,7 @@ TASKS = {
 
 
 def state_of(task: Task) -> TaskState:
-    return take(task, {}, [None] * task.worlds)
+    return capture(task, {}, [None] * task.worlds)
 
 
 def assert_same_state(ours: Task, theirs: Task) -> None:
@@ -110,7 +110,7 @@ def test_all_worlds_may_begin_where_one_is(name):
     state = state_of(one)
     found = rollout(many, actions, initial=state)
     for world in (0, 7, 11):
-        put(one, {}, state)
+        reinstate(one, {}, state)
         np.testing.assert_array_equal(rollout(one, actions[world : world + 1]).rewards[0], found.rewards[world])
 
 

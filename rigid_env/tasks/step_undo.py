@@ -8,7 +8,7 @@ from physics.undo import Undo
 from rigid_env.tasks.task_parts import Stepped
 
 
-class Before:
+class StepUndo:
     """Arrays for a copy of all that a control step changes.
 
     Parameters
@@ -28,7 +28,7 @@ class Before:
         self._generators: dict[int, dict] = {}
 
     def keep(self) -> Undo:
-        """Copy what the coming step changes; returns `put_back`."""
+        """Copy what the coming step changes; returns `undo`."""
         task = self._task
         for array, kept in self._kept:
             kept[...] = array
@@ -38,9 +38,9 @@ class Before:
         if task.disturbed is not None:
             due = task.disturbed.due().tolist()
             self._generators = {world: task.generators[world].bit_generator.state for world in due}
-        return self.put_back
+        return self.undo
 
-    def put_back(self) -> None:
+    def undo(self) -> None:
         """Restore the state at the last `keep`."""
         task = self._task
         for array, kept in self._kept:
