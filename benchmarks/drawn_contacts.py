@@ -17,7 +17,7 @@ import numpy as np
 import physics
 from physics.world.parameters import quaternion_of
 from physics.world.setters import start_anew
-from rigid_env.hard_cases.cases.random_scenes import directions, log_uniform
+from rigid_env.hard_cases.cases.random_draws import directions, log_uniform
 
 MOST_WALLS = 4
 FAR = -1e6  # offset of walls out of use, which a scene has so that all share one kernel [m]

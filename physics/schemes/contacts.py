@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.compiler.decorators import kernel
+from physics.html_table import parts_table
+from physics.summary import parts_repr
 
 ROWS_PER_BODY = 12
 """Rows that contacts are shown in, for each body: a block in a corner touches three walls with four vertices each."""
@@ -51,6 +53,12 @@ class Contacts(NamedTuple):
     force: np.ndarray
     impulse: np.ndarray
     ends: np.ndarray
+
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return f"worlds={len(self.count)}", f"rows={self.ends.shape[1]}", f"contacts={self.count.sum()}"
 
 
 class Strongest(NamedTuple):

@@ -8,10 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.compiler.decorators import kernel
+from physics.html_table import parts_table
 from physics.kernels.state import layout as at
 from physics.kernels.time_stepping import event_log as ev
 from physics.schemes.contact_memory import call
 from physics.schemes.contacts import EVERY_BODY, Strongest, keep_strongest
+from physics.summary import parts_repr
 from physics.world.batch import Batch
 
 IMPACT_ROOM = 256
@@ -54,6 +56,15 @@ class Impacts(NamedTuple):
     ends: np.ndarray
     total: np.ndarray
     left_out: np.ndarray
+
+    __repr__ = parts_repr
+    _repr_html_ = parts_table
+
+    def _parts(self) -> tuple[str, ...]:
+        return (
+            f"worlds={len(self.count)}", f"rows={self.ends.shape[1]}", f"pairs={self.count.sum()}",
+            f"left_out={self.left_out.sum()}",
+        )  # fmt: skip
 
 
 class _Pairs(NamedTuple):

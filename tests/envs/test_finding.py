@@ -98,7 +98,7 @@ def test_signatures_are_explicit_and_hold_the_tasks_defaults():
     task = defaults(BlockTask.__init__, "worlds", "self")
     picture = {
         "render_mode": None, "width": 960, "height": 600, "camera": None, "arrows": True,
-        "obs": "state", "obs_size": (84, 84), "obs_stack": 1, "contacts": 0,
+        "obs": "state", "obs_size": (84, 84), "obs_stack": 1, "contacts": 0, "impacts": 0,
     }  # fmt: skip
     for single in (rigid_env.BlockReachEnv, rigid_env.BlockReorientEnv):
         assert defaults(single) == {**task, **picture}

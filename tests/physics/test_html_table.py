@@ -70,6 +70,9 @@ def every_public_object():
     yield from (physics.Spring((0, 9, 0)), physics.Push((1, 2, 3)))
     yield physics.Truth(len, "m", 0.5)
     world = physics.World(scenes.drop())
+    world.keep_impacts()
+    world.step()
+    yield from (world.read_contacts(), world.read_impacts())
     yield physics.rollout(world, np.zeros((1, 3, 1, 6)), steps=3)
 
 

@@ -40,7 +40,7 @@ class Ladder:
     repeats : int
     """
 
-    accuracies: tuple[str, ...] = frontier_run.PRESETS
+    accuracies: tuple[str, ...] = frontier_run.SHOWN_PRESETS
     steps: tuple[float, ...] | None = None
     peer_steps: tuple[float, ...] = PEER_STEPS
     repeats: int = REPEATS
