@@ -54,7 +54,7 @@ WORLDS = rows(
     ("accuracy-list", lambda: world(accuracy=["fast"]), ("accuracy is ['fast']", "allowed are fast")),
     ("threads-zero", lambda: world(threads=0), ("threads is 0", "at least 1")),
     ("threads-bool", lambda: world(threads=True), ("threads is True", "integers")),
-    ("world-keyword", lambda: world(acuracy="fast"), ("World got an unexpected", "'acuracy' (given: 'fast')", "are accuracy,")),
+    ("world-keyword", lambda: world(acuracy="fast"), ("World got an", "'acuracy' (given: 'fast')", "are accuracy,")),
     ("sequential-without-events", lambda: world(accuracy=p.Accuracy(collisions="sequential")),
      ("Accuracy.collisions is 'sequential'", "events")),
     ("sleeping-with-events", lambda: p.World(scene(p.Contact(), p.Sleeping()), accuracy="precise"),
