@@ -138,7 +138,17 @@ def _between(start: float, end: float, left: float) -> float:
 
 
 def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:
-    """A new model on the CPU, where small networks are fastest."""
+    """A new model on the CPU, where small networks are fastest.
+
+    Raises
+    ------
+    ValueError
+        If the algorithm refuses its arguments, in the words of Stable-Baselines3.
+    """
     policy = "MultiInputPolicy" if isinstance(env.observation_space, gym.spaces.Dict) else "MlpPolicy"
     arguments = algorithm_arguments(config, env.action_space.shape[0])
-    return CLASSES[config.algo](policy, env, seed=config.seed, device="cpu", **arguments)
+    try:
+        return CLASSES[config.algo](policy, env, seed=config.seed, device="cpu", **arguments)
+    except (AssertionError, TypeError, ValueError, ZeroDivisionError) as error:
+        told = str(error).strip() or type(error).__name__
+        raise ValueError(f"algorithm is {config.algorithm}, which {config.algo} refuses: {told}") from error

@@ -13,6 +13,9 @@ from typing import Any
 import yaml
 from filelock import FileLock, Timeout
 
+import physics
+from physics.accuracy import resolve
+
 HYPERPARAMETERS = Path(__file__).with_name("hyperparameters.yml")
 
 ALGORITHMS = ("ppo", "sac")
@@ -20,7 +23,7 @@ ALGORITHMS = ("ppo", "sac")
 LOCK = ".lock"  # in the folder of a run
 
 # Fields that may change while a run goes on from its checkpoint.
-CHANGEABLE = ("target", "max_steps", "threads")
+CHANGEABLE = ("target", "max_steps", "threads", "evaluation_accuracy")
 
 
 class RunInUse(ValueError):
@@ -87,6 +90,12 @@ class RunConfig:
                 raise ValueError(f"{name} is {value!r}; allowed are integers of at least 1")
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or self.seed < 0:
             raise ValueError(f"seed is {self.seed!r}; allowed are integers of at least 0")
+        for name in ("algorithm", "env_kwargs"):
+            if not isinstance(getattr(self, name), dict):
+                raise ValueError(f"{name} is {getattr(self, name)!r}; allowed is a dict: set one of its entries")
+        for name in ("accuracy", "evaluation_accuracy"):
+            value = getattr(self, name)
+            resolve(physics.Accuracy(**value) if isinstance(value, dict) else value, name)
         if not 0.0 < self.target <= 1.0:
             raise ValueError(f"target is {self.target!r}; allowed are success rates over 0 and up to 1")
 
@@ -144,7 +153,7 @@ def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
 
 
 def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:
-    """The configuration of a new run: hyperparameters of the file, with `setters` that are not None.
+    """The configuration of a new run: hyperparameters of the file, with those `changes` that are not None.
 
     Raises
     ------
@@ -157,7 +166,7 @@ def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **
 
 
 def change(config: RunConfig, **changes: Any) -> RunConfig:
-    """The same configuration with those `setters` that are not None."""
+    """The same configuration with those `changes` of fields that are not None; see `agents.settings` for entries."""
     return replace(config, **{name: value for name, value in changes.items() if value is not None})
 
 

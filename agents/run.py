@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +80,7 @@ def run_or_resume(
     start, run, console = time.perf_counter(), RunFolder(Path(folder)), console or make_console()
     with run.locked():
         if run.config.is_file():
-            _check_same(run, config)
+            check_same(run, config)
         kept = read_result(run, config)
         if kept is not None:
             return kept
@@ -110,13 +110,28 @@ def read_result(run: RunFolder, config: RunConfig) -> dict[str, Any] | None:
     return result if is_reached or result["steps"] >= config.max_steps else None
 
 
-def _check_same(run: RunFolder, config: RunConfig) -> None:
-    """Refuse to go on with a run as another one."""
-    kept = run.read_config()
-    for name in (f.name for f in fields(RunConfig)):
-        ours, theirs = getattr(config, name), getattr(kept, name)
-        if name not in CHANGEABLE and ours != theirs:
+def check_same(run: RunFolder, config: RunConfig) -> None:
+    """Refuse to go on with a run as another one.
+
+    Raises
+    ------
+    ValueError
+        Naming the first setting that differs.
+    """
+    ours, theirs = asdict(config), asdict(run.read_config())
+    for name in ours:
+        if name not in CHANGEABLE and ours[name] != theirs[name]:
+            where, mine, kept = _difference(name, ours[name], theirs[name])
             raise ValueError(
-                f"{name} is {ours!r}, and {theirs!r} in {str(run.path)!r}; allowed to change while a run goes on are "
+                f"{where} is {mine!r}, and {kept!r} in {str(run.path)!r}; allowed to change while a run goes on are "
                 f"{', '.join(CHANGEABLE)}"
             )
+
+
+def _difference(name: str, ours: Any, theirs: Any) -> tuple[str, Any, Any]:
+    """Dotted name of the first entry that differs, and both values."""
+    if isinstance(ours, dict) and isinstance(theirs, dict):
+        for key in (*ours, *theirs):
+            if ours.get(key) != theirs.get(key):
+                return _difference(f"{name}.{key}", ours.get(key), theirs.get(key))
+    return name, ours, theirs

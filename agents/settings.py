@@ -11,6 +11,9 @@ import yaml
 from agents.config import RunConfig
 from physics.keywords import nearest_first
 
+OF_OPTIONS = {"env": "to name the environment alone", "algo": "--algo", "seed": "--seed, or --seeds of a sweep"}
+"""Fields that decide which hyperparameters a run starts from, and its name: options have them."""
+
 OPEN_FIELDS = ("algorithm", "env_kwargs")  # of a `RunConfig`: dicts with entries of any name
 
 
@@ -78,6 +81,8 @@ def apply_settings(config: RunConfig, settings: Mapping[str, Any]) -> RunConfig:
     for name, value in settings.items():
         head, *rest = name.split(".")
         known = [f.name for f in fields(RunConfig)]
+        if head in OF_OPTIONS:
+            raise ValueError(f"--set names {head}; allowed is {OF_OPTIONS[head]}")
         if head not in known:
             raise ValueError(f"{head} is no setting of a run; allowed are {', '.join(nearest_first(head, known))}")
         if not rest:

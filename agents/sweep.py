@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 
+from agents.algorithms import algorithm_arguments, make_vector_env
 from agents.config import HYPERPARAMETERS, RunFolder
 from agents.evaluate import write_json
 from agents.launchers.trial import Launch, Outcome
@@ -24,6 +26,23 @@ from rigid_env.terminal import Table, make_console, number_columns, progress_bar
 
 LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", "print": "printed"}
 INTERRUPTED = 130
+
+
+def check_arguments(trials: Sequence[Trial]) -> None:
+    """Refuse arguments of algorithms and environments that the first step of a trial would refuse.
+
+    Raises
+    ------
+    ValueError
+    """
+    seen = []
+    for trial in trials:
+        config = trial.config
+        algorithm_arguments(config)
+        arguments = (config.env, config.env_kwargs)
+        if arguments not in seen:
+            seen.append(arguments)
+            make_vector_env(config.env, 1, accuracy=config.accuracy, **config.env_kwargs).close()
 
 
 def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
@@ -46,6 +65,8 @@ def sweep(
     left = [trial for trial in trials if trial.name not in ended]
     if ended:
         console.print(f"{len(ended)} of {len(trials)} trials are complete already", highlight=False)
+    if left:
+        console.print(f"{len(left)} trials to run, {jobs} at once", highlight=False)
     with progress_bar(console) as bar:
         task = bar.add_task("trials", total=len(trials), completed=len(ended))
         for outcome in launch(left, out, jobs, address) if left else ():
@@ -105,12 +126,18 @@ def main(
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
         if launcher not in LAUNCHERS:
             raise ValueError(f"launcher is {launcher!r}; allowed are {', '.join(LAUNCHERS)}")
+        check_arguments(trials)
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise typer.BadParameter(f"--out is {str(out)!r}, which cannot be made: {error.strerror}") from error
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     launch = importlib.import_module(f"agents.launchers.{LAUNCHERS[launcher]}").launch
-    out.mkdir(parents=True, exist_ok=True)
     try:
         outcomes = sweep(trials, out.resolve(), launch, jobs, address, console)
+    except DependencyNotInstalled as error:
+        console.print(f"Error: {error}", soft_wrap=True)
+        raise typer.Exit(1) from None
     except KeyboardInterrupt:
         console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
         raise typer.Exit(INTERRUPTED) from None

@@ -22,7 +22,7 @@ import typer
 
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, default_algorithm, make_config, make_folder
 from agents.evaluate import JsonOption, write_json
-from agents.run import read_result, run_or_resume
+from agents.run import check_same, read_result, run_or_resume
 from agents.settings import apply_settings, parse_settings
 from agents.training import Interrupted, train
 from rigid_env.cli.names import checked_preset
@@ -94,15 +94,21 @@ def main(
     start, console = time.perf_counter(), make_console()
     try:
         chosen = parse_settings(settings or [])
+        limits = {"target": target, "max_steps": max_steps, "threads": threads}
+        told = {"num_envs": num_envs, "accuracy": accuracy, **limits}
+        for name in (name for name, value in told.items() if value is not None and name in chosen):
+            raise ValueError(f"--set names {name}, which has an option here; allowed is one of them")
         fixed = {"env": env, "algo": algo, "seed": seed, "num_envs": num_envs, "accuracy": accuracy}
         config = choose_config(resume, hyperparameters, fixed)
-        config = change(config, target=target, max_steps=max_steps, threads=threads)
+        config = change(config, **limits)
         config = apply_settings(config, chosen)
         if resume is not None and folder is not None:
             raise ValueError(f"--folder is {str(folder)!r}, with --resume; allowed is one of them")
         given = resume or folder
         run = make_folder(out, config) if given is None else RunFolder(given)
         console.print(f"run         {run.path}", soft_wrap=True)
+        if run.config.is_file():
+            check_same(run, config)
         if read_result(run, config) is not None:
             console.print("This run is complete: a larger --max-steps or --target trains on.")
         result = run_or_resume(config, run.path, with_video=video, with_tensorboard=tensorboard, console=console)

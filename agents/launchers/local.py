@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.connection
+import os
+import sys
+import threading
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -22,13 +26,24 @@ def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = 
                 yield outcome
             return
         except BrokenProcessPool:
-            continue
+            told = "a process was lost: the trials that ran go on from their last checkpoints"
+            print(told, file=sys.stderr, flush=True)
     for name in left:
         yield Outcome(name, None, f"its process ended {1 + RETRIES} times; is there memory for {jobs} of them?")
 
 
+def _end_with_parent() -> None:
+    """Let this process end as soon as the one that started it has; its trial goes on from a checkpoint, next time."""
+
+    def watch() -> None:
+        multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
 def _run_all(trials: Sequence[Trial], out: Path, jobs: int) -> Iterator[Outcome]:
-    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_end_with_parent)
     try:
         for future in as_completed([pool.submit(run_trial, t.name, t.config, str(out)) for t in trials]):
             yield future.result()

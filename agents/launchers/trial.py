@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from rich.console import Console
 
 from agents.config import RunConfig, RunInUse
 from agents.run import run_or_resume
+from agents.training import Interrupted
 from agents.trials import Trial
 
 PATIENCE = 60.0  # for a folder that a lost worker still holds [s]
@@ -32,14 +34,25 @@ class Launch(Protocol):
 
 
 def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE) -> Outcome:
-    """Run a trial, or go on with it; a `ValueError` is its outcome."""
-    limit = time.monotonic() + patience
+    """Run a trial, or go on with it; an error is its outcome, too, and only Ctrl-C ends more than the trial."""
+    limit, is_told = time.monotonic() + patience, False
     while True:
         try:
             return Outcome(name, run_or_resume(config, Path(out) / name, console=Console(quiet=True)))
         except RunInUse as error:
             if time.monotonic() >= limit:
                 return Outcome(name, None, str(error))
+            if not is_told:
+                print(f"{name} is in use by another process: waiting for it ...", file=sys.stderr, flush=True)
+                is_told = True
             time.sleep(0.2)
-        except ValueError as error:
-            return Outcome(name, None, str(error))
+        except Interrupted:
+            raise
+        except Exception as error:  # of one trial: the others go on
+            return Outcome(name, None, _told(error))
+
+
+def _told(error: Exception) -> str:
+    """An error in one line."""
+    words = " ".join(str(error).split())
+    return words if isinstance(error, ValueError) else f"{type(error).__name__}: {words}"

@@ -1,9 +1,10 @@
 """Scheme: a way to step worlds of some scenes, as one object. `physics.schemes` lists them.
 
-To add one:
+To add one, copy the module that is nearest to it (`springs` is the shortest), and keep to these rules:
 
 1. Write its kernels in a folder of `physics/kernels`. An entry kernel takes a work queue, a time grid and the arrays of
-   bodies (`physics.kernels.state.groups`), then arguments of its own, and returns nothing.
+   bodies (`physics.kernels.state.groups`), then arguments of its own, and returns nothing. It goes through the worlds
+   by `physics.kernels.parallel.work_stealing.for_each_world`, and adds the wrench of each body to its loads.
 2. Write a module in `physics/schemes` with a subclass of `Scheme`, and `SCHEMES`, a tuple of its instances.
 3. Add the module's name to `MODULES` in `physics/schemes/__init__.py`. The first scheme there that takes a scene steps
    it: the order matters where two take the same.
@@ -13,10 +14,13 @@ To add one:
 6. `make_scratch` gives the working memory of one thread, `make_motion` a second one if the kernel has it. A step leaves
    nothing in it that the next one reads: worlds move between threads.
 7. `memory` is the memory of contacts from one step to the next, and the only reader of it (`ContactMemory`). What
-   starts a solve and what users see come from the same rows.
+   starts a solve and what users see come from the same rows. `WallMemory` and `BodyMemory` can be shared.
 8. `arguments` are those of the kernel after the first three, for thread k. Switches that are None are pruned by the
    compiler; an argument of another type compiles another kernel.
 9. A kernel writes states that are finite, or leaves the world as it was and counts a fault in the report.
+
+`tests/schemes` adds a toy scheme by these rules. That results are right is for tests of its own to show: hold it
+against `tests/reference`, and run the hard cases (`rigid-env hard-cases`).
 """
 
 from __future__ import annotations

@@ -42,10 +42,10 @@ def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
 
 
 def root_mean_square(difference: np.ndarray) -> float:
-    """Root of the mean over the samples of |difference|² of the worst body; `difference` is (samples, bodies, 3).
+    """Root of the mean over samples of the largest |difference|² of any body; `difference` is (samples, bodies, 3).
 
-    Velocities are compared in the mean. An impact a moment early makes an error as large as the impact between the two
-    moments, however close they are.
+    It is for velocities, whose largest error would say little: if an impact comes a moment early, the velocity is wrong
+    by the whole impact in this moment, however short that is.
     """
     return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
 

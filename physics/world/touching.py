@@ -103,7 +103,7 @@ class Touching(Batch):
         if self.is_bound:
             raise ValueError(
                 f"keep_impacts(room={room}) comes after a Stepper of this world has taken a step, and would not reach "
-                "it; allowed is to call it before"
+                "it; allowed is to call it before, or to make an environment with impacts=N"
             )
         self.impacts = KeptImpacts(room, is_known=self.time == 0.0)
         self._make_event_room(room)

@@ -140,10 +140,10 @@ class Camera:
 def fit_camera(points, direction, size, fov_y=30.0, margin=0.06, up=(0.0, 1.0, 0.0)):
     """Nearest camera that looks along a direction and has all points in sight.
 
-    With s the points' coordinates along the line of sight and d how far back the eye is, a point is in sight
-    if |x - c| ≤ t (s + d), t the tangent of half the field of view. Both sides of the picture give
-    max(x - t s) - t d ≤ c ≤ min(x + t s) + t d, so d ≥ (max(x - t s) - min(x + t s)) / (2t), and c lies in
-    the middle when it is equal. The same for y; the larger d holds.
+    A point has the coordinates x across the picture and s along the line of sight. The eye is at x = c, a distance d
+    back. The point is in sight if |x - c| ≤ t (s + d), with t the tangent of half the field of view. All points are if
+    max(x - t s) - t d ≤ c ≤ min(x + t s) + t d. So d is at least (max(x - t s) - min(x + t s)) / (2t), and with this d
+    one c is left, in the middle. Upwards the same holds; the larger d is taken.
 
     Parameters
     ----------

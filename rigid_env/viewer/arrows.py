@@ -58,7 +58,7 @@ class Arrows(Nodes):
     Attributes
     ----------
     unit : float
-        That sizes are given in [m]; the extent of the largest body at first.
+        Length that arrow heads and limits of lengths are multiples of [m]: at first the extent of the largest body.
     """
 
     def __init__(self, scene, placement: Placement, name: str = ""):

@@ -135,7 +135,10 @@ def test_settings_reach_anything_that_the_configuration_holds():
         ("learning_rate", "--set is 'learning_rate'; allowed is NAME=VALUE"),
         ("max_step=3", "max_step is no setting of a run; allowed are max_steps"),
         ("max_steps=few", "max_steps is 'few'; allowed are integers"),
-        ("seed.x=1", "seed.x is 1; allowed are entries of algorithm, env_kwargs"),
+        ("max_steps.x=1", "max_steps.x is 1; allowed are entries of algorithm, env_kwargs"),
+        ("env=other", "--set names env; allowed is to name the environment"),
+        ("env_kwargs=3", "env_kwargs is 3; allowed is a dict"),
+        ("evaluation_accuracy=quick", "evaluation_accuracy is 'quick'; allowed are fast"),
         ("algorithm.=1", "algorithm. is 1; allowed are entries"),
         ("algorithm.gamma=[1", "algorithm.gamma is .*; allowed is YAML"),
     ],
@@ -152,6 +155,8 @@ def test_settings_that_are_none_name_what_is_allowed(text, message):
     [
         ("algorithm.learning_rat=1", "algorithm.learning_rat is no argument of ppo; allowed are learning_rate,"),
         ("env_kwargs.half_widht=1", "half_widht"),
+        ("algorithm.learning_rate=abc", "which ppo refuses: "),
+        ("algorithm.policy_kwargs.net_arh=[3]", "which ppo refuses: .*net_arh"),
     ],
 )
 def test_a_run_that_cannot_begin_leaves_nothing(tiny, tmp_path, text, message):

@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -127,7 +128,7 @@ def test_a_sweep_goes_on_where_it_was_ended(trials, tmp_path, short, monkeypatch
 
 
 def test_a_failed_trial_is_told_and_the_others_run(hyperparameters, tmp_path, short):
-    trials = make_trials([REACH], [0], {"algorithm.gamm": [1], "seed": [5]}, None, hyperparameters)
+    trials = make_trials([REACH], [0], {"algorithm.gamm": [1]}, None, hyperparameters)
     trials += make_trials([REACH], [0], {}, None, hyperparameters)
     failed, good = sweep(trials, tmp_path / "sweep", in_turn, 1, None, QUIET)
     assert failed == Outcome(failed.name, None, failed.error)
@@ -157,6 +158,10 @@ def test_the_command_refuses_what_it_does_not_know(tmp_path, monkeypatch):
         (["--seeds", "x"], "seeds is 'x'"),
         (["--set", "algorithm.gamma"], "--set is 'algorithm.gamma'; allowed is NAME=VALUE"),
         (["--accuracy", "sloppy"], "sloppy"),
+        (["--set", "seed=3"], "--set names seed; allowed is --seed"),
+        (["--set", "algorithm.gamm=0.9"], "algorithm.gamm is no argument of ppo; allowed are gamma"),
+        (["--set", "env_kwargs.half_widt=9"], "unexpected keyword argument 'half_widt'"),
+        (["--out", "/proc/none/x"], "--out is '/proc/none/x', which cannot be made"),
     ):
         done = CliRunner().invoke(app, [REACH, *options])
         assert done.exit_code == 2, done.output
@@ -195,6 +200,26 @@ def test_a_process_that_is_killed_costs_no_trial(trials, tmp_path):
     straight = tmp_path / "straight"
     sweep(trials, straight, in_turn, 1, None, QUIET)
     assert results(out, trials) == results(straight, trials)
+
+
+@pytest.mark.exhaustive
+def test_processes_end_with_the_program_that_started_them(hyperparameters, tmp_path):
+    command = [sys.executable, "-m", "agents.sweep", REACH, "--seeds", "0-1", "--set", "max_steps=10000000",
+               "--hyperparameters", str(hyperparameters), "--out", str(tmp_path / "sweep")]  # fmt: skip
+    parent = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+    children: list[str] = []
+    limit = time.monotonic() + 60
+    while len(children) < 2 and time.monotonic() < limit:
+        time.sleep(0.2)
+        found = subprocess.run(["pgrep", "-P", str(parent.pid), "-f", "spawn_main"], capture_output=True, text=True)
+        children = found.stdout.split()
+    time.sleep(3.0)  # both have begun
+    parent.kill()
+    parent.wait()
+    while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < limit:
+        time.sleep(0.2)
+    assert len(children) == 2
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
 @pytest.mark.exhaustive

@@ -58,9 +58,9 @@ class _Cache:
     def load_overload(self, sig, target_context):
         """Machine code for the types `sig` of arguments; None without a usable one.
 
-        Numba refreshes its context first: that fills it with all it can compile, for which SciPy is imported, and takes
-        four times as long as to read a step. Machine code needs none of it, as kernels have no run time of Numba
-        (`_nrt` of `backend`). Where a kernel is compiled after all, `CompilerBase` refreshes the context.
+        Numba's own cache refreshes the context here, which imports SciPy and takes four times as long as to read a
+        step. This one does not: machine code needs nothing of the context, since kernels have no run time of Numba
+        (`_nrt` of `backend`). Where a kernel is compiled after all, `CompilerBase` refreshes it.
         """
         if not self._is_enabled:
             return None

@@ -252,5 +252,8 @@ def _unyielding(value, rho, body):
 
 @if_law((LAW_STIFFNESS,), _unyielding)
 def scale_by_compliance(value, rho, body):
-    """Scale a normal impulse q - ρ u, or its slope, by the compliance γ: p = q - ρ (u + γ p)."""
+    """Normal impulse p of a wall with the compliance γ, from `value` = q - ρ u without it; or the slope of p.
+
+    It solves p = q - ρ (u + γ p): p = (q - ρ u)/(1 + ρ γ).
+    """
     return value / (1.0 + rho * body.give)

@@ -1,7 +1,7 @@
 """Data of a patch: three or four contacts of one wall, a lane each, and the groups that its solvers share.
 
-All is in the stretched frame of `anisotropic_friction` (of an even wall: its frame). The fourth lane of three contacts
-is the third contact once more, and never pushes.
+Vectors are in the stretched frame of `anisotropic_friction`; where friction is the same in all directions this is the
+frame of the wall. Of three contacts the fourth lane is a copy of the third, which never pushes.
 """
 
 from __future__ import annotations

@@ -45,7 +45,10 @@ def store_force_margins(row, scratch, motion):
 
 @inlined
 def _probe_margins(row, t, moment, offset_frame, scratch, motion):
-    """Write the margins `moment` after a row of `y` at the time t, with the rate of change `rate`, into INSIDE."""
+    """Write the margins of the forces at t + `moment` [s] into the row `_INSIDE_ROW`.
+
+    The state there is extrapolated from a row of `motion.smooth.y`, by the rate of change `motion.smooth.rate`.
+    """
     for c in range(Y_SIZE):
         motion.smooth.y[ROW_CURRENT, c] = motion.smooth.y[row, c] + moment * motion.smooth.rate[c]
     compute_state_rate(ROW_CURRENT, t + moment, offset_frame, scratch, motion)

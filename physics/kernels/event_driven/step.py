@@ -128,9 +128,9 @@ def begin_event_substep(y, start, h, offset_frame, memory, scratch, motion):
 
 @kernel
 def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motion, report):
-    """Find the contact mode from y on; return whether a contact problem was solved, since the body may come to rest.
+    """Find the contact mode from y on; return whether a contact problem was solved: only then may the body rest.
 
-    If a guard has foretold the end of the contact mode, the next one is looked for a moment later.
+    If the end of the last mode was foretold, the next one is looked for a moment later.
     """
     seen, later = y, 0.0
     if is_foretold:

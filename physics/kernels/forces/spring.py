@@ -139,7 +139,7 @@ def push_load(state, p, t):
 
 @inlined
 def push_rates(state, p, J, h):
-    """Rates of `implicit_loads`: a force along the world's axes swings the body."""
+    """Rates of `implicit_loads`: a force with a fixed direction in the world makes the body swing like a pendulum."""
     if p[PUSH_IS_BODY_FIXED] != 0.0:
         return ZERO
     return (

@@ -45,7 +45,7 @@ def _until_all_have_hit(aim, room: float) -> float:
 
 
 def _signed(world, aim, room: float) -> np.ndarray:
-    """Velocity with the reversals by further hits of the far walls undone."""
+    """Velocity, turned back once for each further hit: a far wall may send the sphere into the corner again."""
     hits = np.floor((np.abs(aim) * world.time + room) / (2 * room))
     return world.linvel[0, 0] * np.where(np.mod(hits, 2) == 0, -1.0, 1.0)
 

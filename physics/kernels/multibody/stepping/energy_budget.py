@@ -29,7 +29,7 @@ _FREE_LIFT_SLOPS = 10.0
 
 @inlined
 def save_pre_load_velocity(b, velocity, many):
-    """Keep the velocity of body b before its loads; `bodies.state` has its momenta, `bodies.twist` its ω."""
+    """Keep the velocity of body b before its loads act: `velocity`, and the angular velocity in `bodies.twist`."""
     put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY, velocity)
     put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3, row_vector(many.bodies.twist, b, 3))
 
