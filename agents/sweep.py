@@ -6,7 +6,6 @@ is `agents.train.run_or_resume`. What is complete stands in ``DIR/results.json``
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,13 +17,14 @@ from rich.console import Console
 from agents.algorithms import algorithm_arguments, make_vector_env
 from agents.config import HYPERPARAMETERS, RunFolder
 from agents.evaluate import write_json
-from agents.launchers.trial import Launch, Outcome
 from agents.run import read_result
 from agents.trials import Trial, make_trials, parse_grid, parse_seeds
+from agents.worker import make_job
 from rigid_env.cli.names import checked_preset
+from rigid_env.launchers import LAUNCHERS, load
+from rigid_env.launchers.job import Ended, Launch
 from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
 
-LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", "print": "printed"}
 INTERRUPTED = 130
 
 
@@ -53,15 +53,15 @@ def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
 
 def sweep(
     trials: Sequence[Trial], out: Path, launch: Launch, jobs: int, address: str | None, console: Console
-) -> list[Outcome]:
+) -> list[Ended]:
     """Run the trials that are not complete; a line tells each that ends.
 
     Returns
     -------
-    list of Outcome
+    list of Ended
         One for each that is complete or has failed, in the order of the trials.
     """
-    ended = {name: Outcome(name, result) for name, result in complete(trials, out).items()}
+    ended = {name: Ended(name, result) for name, result in complete(trials, out).items()}
     left = [trial for trial in trials if trial.name not in ended]
     if ended:
         console.print(f"{len(ended)} of {len(trials)} trials are complete already", highlight=False)
@@ -69,24 +69,24 @@ def sweep(
         console.print(f"{len(left)} trials to run, {jobs} at once", highlight=False)
     with progress_bar(console) as bar:
         task = bar.add_task("trials", total=len(trials), completed=len(ended))
-        for outcome in launch(left, out, jobs, address) if left else ():
-            ended[outcome.name] = outcome
+        for end in launch([make_job(trial, out) for trial in left], out, jobs, address) if left else ():
+            ended[end.name] = end
             bar.update(task, completed=len(ended))
-            console.print(f"{len(ended)} of {len(trials)}  {_told(outcome)}", highlight=False, soft_wrap=True)
+            console.print(f"{len(ended)} of {len(trials)}  {_told(end)}", highlight=False, soft_wrap=True)
     return [ended[trial.name] for trial in trials if trial.name in ended]
 
 
-def _told(outcome: Outcome) -> str:
-    if outcome.result is None:
-        return f"{outcome.name}: {outcome.error}"
-    rate, steps = outcome.result["evaluation"]["success_rate"], outcome.result["steps"]
-    return f"{outcome.name}: success {rate:.1%} after {steps / 1e6:.2f} M steps"
+def _told(end: Ended) -> str:
+    if end.result is None:
+        return f"{end.name}: {end.error}"
+    rate, steps = end.result["evaluation"]["success_rate"], end.result["steps"]
+    return f"{end.name}: success {rate:.1%} after {steps / 1e6:.2f} M steps"
 
 
-def make_table(outcomes: Sequence[Outcome]) -> Table:
+def make_table(ends: Sequence[Ended]) -> Table:
     """Success of each trial on fresh episodes."""
     table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
-    for name, result, _ in outcomes:
+    for name, result, _ in ends:
         if result is None:
             table.add_row(name, "failed", "", "", "", "")
             continue
@@ -124,28 +124,26 @@ def main(
         if accuracy is not None:
             grid["accuracy"] = [checked_preset(name.strip()) for name in accuracy.split(",")]
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
-        if launcher not in LAUNCHERS:
-            raise ValueError(f"launcher is {launcher!r}; allowed are {', '.join(LAUNCHERS)}")
+        launch = load(launcher)
         check_arguments(trials)
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise typer.BadParameter(f"--out is {str(out)!r}, which cannot be made: {error.strerror}") from error
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    launch = importlib.import_module(f"agents.launchers.{LAUNCHERS[launcher]}").launch
     try:
-        outcomes = sweep(trials, out.resolve(), launch, jobs, address, console)
+        ends = sweep(trials, out.resolve(), launch, jobs, address, console)
     except DependencyNotInstalled as error:
         console.print(f"Error: {error}", soft_wrap=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
         raise typer.Exit(INTERRUPTED) from None
-    if outcomes:
+    if ends:
         write_json(out / "results.json", {"trials": [{"name": each.name, "result": each.result, "error": each.error}
-                                                     for each in outcomes]})  # fmt: skip
-        console.print(make_table(outcomes))
-    if any(each.result is None for each in outcomes):
+                                                     for each in ends]})  # fmt: skip
+        console.print(make_table(ends))
+    if any(each.result is None for each in ends):
         raise typer.Exit(1)
 
 

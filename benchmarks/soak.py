@@ -18,10 +18,13 @@ from rich.console import Console
 from rich.progress import Progress
 
 import physics
-from benchmarks import machine, soak_env
+from benchmarks import machine, soak_env, soak_spread
 from benchmarks.shrink import shrink
+from rigid_env.cli.spreading import Address, Jobs, Launcher, make_place
 from rigid_env.hard_cases.cases import random_draws, random_scenes
 from rigid_env.lab.measure.machine import write_json
+from rigid_env.launchers.job import Job
+from rigid_env.launchers.place import Place
 
 BATCH = 200
 RECORDED = 40  # steps: a whole run of `random_scenes.drive`
@@ -83,19 +86,31 @@ def main(
         list[str] | None, typer.Option(help="Presets; none: balanced for scenes, all for --env.")
     ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="Instead of benchmarks/results/soak.json.")] = None,
+    launcher: Launcher = None,
+    seeds: Annotated[int, typer.Option(min=1, help="Of --launcher: seeds from --seed on, each for --minutes.")] = 2,
+    jobs: Jobs = 2,
+    address: Address = None,
 ) -> None:
     """Run random scenes, or environments, and report what breaks a law."""
     console = Console()
     presets = accuracy or (list(physics.PRESETS) if env else ["balanced"])
     for name in presets:
         physics.accuracy.resolve(name)
-    jobs = [(preset, name) for preset in presets for name in env or [None]]
-    found: dict = {}
+    path = json or machine.RESULTS / ("soak_env.json" if env else "soak.json")
     console.print(machine.headline())
+    if launcher is not None:
+        if env:
+            raise typer.BadParameter("env is given with a launcher; allowed are random scenes, without --env")
+        place = make_place(launcher, jobs, address, path)
+        spread = soak_spread.make_jobs(minutes, range(seed, seed + seeds), presets, keep, place.folder)
+        _soak_there(console, place, spread, path, {"seed": seed, "seeds": seeds, "minutes": minutes})
+        return
+    parts = [(preset, name) for preset in presets for name in env or [None]]
+    found: dict = {}
     with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("soaking", total=len(jobs))
-        for preset, name in jobs:
-            seconds = 60.0 * minutes / len(jobs)
+        task = progress.add_task("soaking", total=len(parts))
+        for preset, name in parts:
+            seconds = 60.0 * minutes / len(parts)
 
             def tick(what: str, preset=preset) -> None:
                 progress.update(task, description=f"{preset}: {what}")
@@ -105,10 +120,26 @@ def main(
             else:
                 found[f"{name} {preset}"] = soak_env.soak(name, preset, seconds, seed, keep, tick)
             progress.advance(task)
-    path = json or machine.RESULTS / ("soak_env.json" if env else "soak.json")
     write_json(path, {"seed": seed, "minutes": minutes, "found": found})
     console.print_json(data=found)
     console.print(f"written to {path}")
+
+
+def _soak_there(console: Console, place: Place, jobs: list[Job], path: Path, settings: dict) -> None:
+    """Soak at a place, and write what all seeds found together."""
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("soaking", total=len(jobs))
+        found, errors = soak_spread.merge(
+            place.run(jobs), lambda name: progress.update(task, advance=1, description=name)
+        )
+    for error in errors:
+        console.print(f"Error: {error}", soft_wrap=True)
+    if not place.is_printed:
+        write_json(path, {**settings, "found": found})
+        console.print_json(data=found)
+        console.print(f"written to {path}")
+    if errors:
+        raise typer.Exit(1)
 
 
 if __name__ == "__main__":

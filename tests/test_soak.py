@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 import physics
+from benchmarks import soak_spread
 from benchmarks.shrink import law_broken, shrink
 from benchmarks.soak_env import Judge, Pusher
+from rigid_env.launchers.job import Ended
 from tests.physics.test_bodies import heap
 
 
@@ -51,6 +53,36 @@ def test_the_judge_knows_rewards_that_were_not_earned():
             obs, reward, terminated, *_ = envs.step(action)
             wrong = judge.wrongs(envs, obs, reward + (1e-3 if k == 20 else 0.0), terminated ^ (k == 30), action)
             assert wrong == {20: {"reward not earned": 6}, 30: {"success not earned": 6}}.get(k, {})
+
+
+def test_what_many_processes_found_is_added_up():
+    def one(worlds, failures):
+        return {"mixed": {"worlds": worlds, "steps": 2 * worlds, "failures": failures, "largest_gain": worlds / 100}}
+
+    told = []
+    found, errors = soak_spread.merge(
+        [
+            Ended("a", ("fast", one(200, {"inside": 1}))),
+            Ended("b", ("fast", one(400, {"inside": 2, "energy": 1}))),
+            Ended("c", None, "its process ended"),
+        ],
+        told.append,
+    )
+    whole = {"worlds": 600, "steps": 1200, "failures": {"inside": 3, "energy": 1}, "largest_gain": 4.0}
+    assert found == {"fast": {"mixed": whole}}
+    assert errors == ["c: its process ended"]
+    assert told == ["a", "b", "c"]
+
+
+@pytest.mark.exhaustive
+def test_the_soak_runs_in_many_processes(tmp_path):
+    command = [sys.executable, "-m", "benchmarks.soak", "--minutes", "0.01", "--launcher", "local", "--seeds", "2"]
+    out = tmp_path / "soak.json"
+    done = subprocess.run([*command, "--json", str(out)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    content = json.loads(out.read_text())
+    assert content["seeds"] == 2
+    assert all(family["worlds"] >= 400 for family in content["found"]["balanced"].values())
 
 
 @pytest.mark.exhaustive

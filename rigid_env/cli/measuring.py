@@ -22,6 +22,7 @@ from rigid_env.cli.common import (
     write,
 )
 from rigid_env.cli.files import PLOTS, make_parents, output_option
+from rigid_env.cli.spreading import Address, Jobs, Launcher, make_place
 from rigid_env.terminal import make_console, progress_bar
 
 BENCH_REPEATS = 5
@@ -122,6 +123,9 @@ def accuracy(
     is_full: Annotated[bool, typer.Option("--all", help="Show every point, not only each engine's best.")] = False,
     has_goals: Annotated[bool, typer.Option("--goals", help="Show this project's goals, too.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="Only see that it runs.")] = False,
+    launcher: Launcher = None,
+    jobs: Jobs = 2,
+    address: Address = None,
 ) -> None:
     """Show what accuracy costs in time: error against truth and wall-clock time, beside other engines."""
     with told_errors():
@@ -130,10 +134,11 @@ def accuracy(
 
         console, ladder = make_console(), QUICK if quick else Ladder()
         plot, lacking = drawable(plot, console)
+        place = make_place(launcher, jobs, address, json)
         make_parents(json, plot)
         shown = accuracy_report.Shown(is_full, has_goals, below)
-        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, duration, shown)
-        if json:
+        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, duration, shown, place)
+        if json and report.results:
             accuracy_report.write_result(json, report)
             tell_file(json, console)
         if plot and report.results:
@@ -196,6 +201,9 @@ def hard_cases(
     quick: Annotated[bool, typer.Option("--quick", help="Shorter runs, with limits for them.")] = False,
     json: Json = None,
     plot: Plot = None,
+    launcher: Launcher = None,
+    jobs: Jobs = 2,
+    address: Address = None,
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
@@ -206,11 +214,12 @@ def hard_cases(
         console = make_console()
         plot, lacking = drawable(plot, console)
         plan = make_plan(registry.find(cases or ()), accuracy, dt, steps, not quick, peers)
+        place = make_place(launcher, jobs, address, json)
         make_parents(json, plot)
-        report = run_and_show(console, plan, json)
-        if json:
+        report = run_and_show(console, plan, json, place)
+        if json and report.outcomes:
             tell_file(json, console)
-        if plot:
+        if plot and report.outcomes:
             write_picture(plot, report)
             tell_file(plot, console)
     end(report.is_complete, lacking)

@@ -22,11 +22,13 @@ pytest.importorskip("stable_baselines3")
 from agents import run as runs
 from agents import sweep as program
 from agents import train
-from agents.launchers import local, printed
-from agents.launchers.trial import Outcome, run_trial
+from agents.config import RunInUse
 from agents.run import run_or_resume
 from agents.sweep import complete, sweep
 from agents.trials import make_trials, parse_grid, parse_seeds
+from agents.worker import make_job, run_trial
+from rigid_env.launchers import local, printed
+from rigid_env.launchers.job import Ended, run_job
 from tests.agents.conftest import NUM_ENVS, ROLLOUT, TINY_ALGORITHMS
 
 QUIET = Console(quiet=True)
@@ -58,10 +60,9 @@ def short(monkeypatch):
     monkeypatch.setattr(runs, "EVALUATION_EPISODES", 4)
 
 
-def in_turn(trials, out, jobs, address=None):
+def in_turn(jobs, folder, at_once, address=None):
     """A launcher without processes."""
-    for trial in trials:
-        yield run_trial(trial.name, trial.config, str(out))
+    yield from map(run_job, jobs)
 
 
 def without_times(value):
@@ -107,8 +108,8 @@ def test_seeds_are_numbers_and_ranges():
 
 
 def test_a_sweep_goes_on_where_it_was_ended(trials, tmp_path, short, monkeypatch):
-    def ended(left, out, jobs, address=None):
-        yield from in_turn(left[:2], out, jobs)
+    def ended(left, folder, at_once, address=None):
+        yield from in_turn(left[:2], folder, at_once)
         raise KeyboardInterrupt
 
     out = tmp_path / "sweep"
@@ -116,9 +117,9 @@ def test_a_sweep_goes_on_where_it_was_ended(trials, tmp_path, short, monkeypatch
         sweep(trials, out, ended, 1, None, QUIET)
     seen = []
 
-    def watched(left, out, jobs, address=None):
-        seen.extend(trial.name for trial in left)
-        return in_turn(left, out, jobs)
+    def watched(left, folder, at_once, address=None):
+        seen.extend(job.name for job in left)
+        return in_turn(left, folder, at_once)
 
     outcomes = sweep(trials, out, watched, 1, None, QUIET)
     assert seen == [trial.name for trial in trials[2:]]
@@ -131,14 +132,14 @@ def test_a_failed_trial_is_told_and_the_others_run(hyperparameters, tmp_path, sh
     trials = make_trials([REACH], [0], {"algorithm.gamm": [1]}, None, hyperparameters)
     trials += make_trials([REACH], [0], {}, None, hyperparameters)
     failed, good = sweep(trials, tmp_path / "sweep", in_turn, 1, None, QUIET)
-    assert failed == Outcome(failed.name, None, failed.error)
+    assert failed == Ended(failed.name, None, failed.error)
     assert "algorithm.gamm is no argument of ppo" in failed.error
     assert good.result is not None
 
 
 def test_a_printed_line_runs_the_trial(trials, tmp_path, short, capsys, monkeypatch):
     here, there = tmp_path / "here", tmp_path / "there"
-    assert list(printed.launch(trials[:1], there, 1)) == []
+    assert list(printed.launch([make_job(trials[0], there)], there, 1)) == []
     line = shlex.split(capsys.readouterr().out)
     assert line[:3] == ["python", "-m", "agents.train"]
     app = typer.Typer()
@@ -227,7 +228,7 @@ def test_a_lost_node_of_a_ray_cluster_costs_no_trial(hyperparameters, tmp_path):
     ray = pytest.importorskip("ray")
     from ray.cluster_utils import Cluster
 
-    from agents.launchers import ray_tasks
+    from rigid_env.launchers import ray_tasks
 
     grid = {"algorithm.learning_rate": [1e-3, 3e-4], "max_steps": [20_000]}
     trials = make_trials([REACH], range(4), grid, None, hyperparameters)
@@ -257,7 +258,7 @@ def test_a_lost_node_of_a_ray_cluster_costs_no_trial(hyperparameters, tmp_path):
 @pytest.mark.exhaustive
 def test_local_jobs_of_submitit_have_the_same_results(trials, tmp_path):
     pytest.importorskip("submitit")
-    from agents.launchers import submitit_jobs
+    from rigid_env.launchers import submitit_jobs
 
     one, two = tmp_path / "one", tmp_path / "two"
     sweep(trials, one, in_turn, 1, None, QUIET)
@@ -265,11 +266,11 @@ def test_local_jobs_of_submitit_have_the_same_results(trials, tmp_path):
     assert results(one, trials) == results(two, trials)
 
 
-def test_a_run_in_use_is_an_outcome_and_not_written_into(trials, tmp_path, short):
+def test_a_run_in_use_is_not_written_into(trials, tmp_path, short):
     (trial, *_) = trials
     run_or_resume(trial.config, tmp_path / trial.name, console=QUIET)
     folder = runs.RunFolder(tmp_path / trial.name)
     folder.result.unlink()
-    with folder.locked():
-        assert "which another process works on" in run_trial(trial.name, trial.config, str(tmp_path), 0.0).error
-    assert run_trial(trial.name, trial.config, str(tmp_path)).result is not None
+    with folder.locked(), pytest.raises(RunInUse, match="which another process works on"):
+        run_trial(trial.name, trial.config, str(tmp_path), 0.0)
+    assert run_trial(trial.name, trial.config, str(tmp_path))["steps"] == trial.config.max_steps

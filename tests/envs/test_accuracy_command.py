@@ -17,10 +17,11 @@ import physics
 from physics import Frontier, FrontierPoint
 from physics.work_precision import run as frontier_run
 from rigid_env.cli import app
-from rigid_env.lab.measure import accuracy, accuracy_report, peers
+from rigid_env.lab.measure import accuracy, accuracy_jobs, accuracy_report, peers
 from rigid_env.lab.measure.accuracy import QUICK, Found, Job, Ladder
 from rigid_env.lab.measure.accuracy_table import answers, goals, make_table, summary
 from rigid_env.lab.measure.truths import CASES
+from rigid_env.launchers.job import Ended
 
 pytestmark = pytest.mark.interpreted
 
@@ -220,6 +221,30 @@ def test_mistakes_are_named_with_what_is_allowed():
     assert "vertex_drop" in run("dorp", "--quick", code=2)
     assert "pybullet" in run("vertex", "--quick", "--peers", "bullet", code=2)
     assert "below" in run("vertex", "--quick", "--below", "-1", code=2)
+
+
+@pytest.mark.exhaustive
+def test_scenes_spread_over_processes_have_the_same_errors(tmp_path):
+    here, there = tmp_path / "here.json", tmp_path / "there.json"
+    run("slide", "--quick", "--json", here)
+    run("slide", "--quick", "--launcher", "local", "--jobs", "1", "--json", there)
+    errors = [[(row["setting"], row["dt"], row["error"]) for row in json.loads(path.read_text())["rows"]]
+              for path in (here, there)]  # fmt: skip
+    assert errors[0] == errors[1]
+
+
+def test_scenes_are_printed_as_lines_for_a_shell(tmp_path):
+    (line,) = run(
+        "slide", "--quick", "--duration", "1.0", "--launcher", "print", "--json", tmp_path / "a.json"
+    ).splitlines()
+    where = tmp_path / "a" / "slide.json"
+    assert line == f"rigid-env accuracy slide --duration 1.0 --quick --json {where}"
+
+
+def test_a_scene_that_is_lost_is_an_error():
+    (job,) = accuracy.make_jobs(["slide"], ladder=QUICK)
+    with pytest.raises(ValueError, match="slide: its process ended"):
+        list(accuracy_jobs.found([job], [Ended("slide", None, "its process ended")], lambda what: None))
 
 
 def test_an_interrupted_command_writes_what_it_has_and_says_so(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from rigid_env.cli import app
@@ -14,6 +15,8 @@ from rigid_env.lab.hard_cases import report
 from rigid_env.lab.hard_cases.peers import run_peer
 from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
 from rigid_env.lab.measure.peers import load
+from rigid_env.launchers.job import Ended
+from rigid_env.launchers.place import Place
 
 runner = CliRunner()
 
@@ -142,3 +145,43 @@ def test_what_another_engine_cannot_express_is_said():
     outcome = run_peer(pushed, load("mujoco"), Setting(is_thorough=False))
     assert outcome.status is Status.UNSUPPORTED
     assert "wrench" in outcome.reason
+
+
+@pytest.mark.exhaustive
+def test_cases_spread_over_processes_have_the_same_outcomes(tmp_path):
+    here, there = tmp_path / "here.json", tmp_path / "there.json"
+    run("parabola", "--quick", "--steps", "0.02", "--json", here)
+    run("parabola", "--quick", "--steps", "0.02", "--launcher", "local", "--jobs", "1", "--json", there)
+    rows, spread = ([{**row, "seconds": 0} for row in json.loads(path.read_text())["rows"]] for path in (here, there))
+    assert rows == spread
+    assert len(rows) == 2
+
+
+def test_cases_are_printed_as_lines_for_a_shell(tmp_path):
+    numbers = tmp_path / "numbers.json"
+    lines = run("parabola", "--quick", "--steps", "0.02", "--launcher", "print", "--json", numbers).splitlines()
+    assert [line.split()[:7] for line in lines] == [
+        ["rigid-env", "hard-cases", "4", "--accuracy", "balanced", "--dt", dt] for dt in ("0.01", "0.02")
+    ]
+    assert not numbers.exists()
+    run(*lines[0].split()[2:])  # a line runs
+    assert (tmp_path / "numbers" / "4-balanced-0.01.json").exists()
+
+
+def test_a_run_that_is_lost_fails_and_says_why(monkeypatch, tmp_path):
+    (case,) = replace_cases(monkeypatch, holds)
+    plan = report.make_plan((case,), "balanced", 0.01, "", True, False)
+
+    class Losing(Place):
+        def run(self, jobs):
+            return (Ended(job.name, None, "its process ended") for job in jobs)
+
+    (outcome,) = report.run_and_show(Console(quiet=True), plan, place=Losing("local", tmp_path)).outcomes
+    assert outcome.status is Status.FAILS
+    assert outcome.reason == "its process ended"
+
+
+def test_options_of_launchers_are_refused_where_they_do_nothing(tmp_path):
+    assert "peers is True with a launcher" in run("parabola", "--peers", "--launcher", "local", code=2)
+    assert "address is '10.0.0.1' without a launcher" in run("parabola", "--address", "10.0.0.1", code=2)
+    assert "launcher is 'cloud'" in run("parabola", "--launcher", "cloud", code=2)

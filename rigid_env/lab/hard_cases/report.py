@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import shlex
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,8 @@ from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case
 from rigid_env.lab.measure.accuracy import load_peers
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.peers import ENGINES, Engine
+from rigid_env.launchers.job import Job
+from rigid_env.launchers.place import Place
 from rigid_env.terminal import progress_bar
 
 
@@ -124,20 +127,35 @@ class Report:
         return {"name": "hard_cases", "is_complete": self.is_complete, "settings": settings, "rows": rows}
 
 
-def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Report:
-    """Run all of it with a progress bar; print tables; `keep` holds all outcomes so far. Ctrl-C ends only the run."""
+def run_and_show(console: Console, plan: Plan, keep: Path | None = None, place: Place | None = None) -> Report:
+    """Run all of it with a progress bar; print tables; `keep` holds all outcomes so far. Ctrl-C ends only the run.
+
+    With `place` the cases of our engine run there, each at one setting; a place that prints its jobs runs none.
+
+    Raises
+    ------
+    ValueError
+        If other engines are to run at a place.
+    """
+    if place is not None and plan.has_peers:
+        raise ValueError("peers is True with a launcher; allowed is one of the two: other engines run in this process")
     engines, missing = load_peers(tuple(ENGINES) if plan.has_peers else ())
     for message in missing:
         console.print(f"skipped: {message}", soft_wrap=True)
-    todo, report = _jobs(plan, tuple(engines.values())), Report(plan)
+    runs, report = _runs(plan, tuple(engines.values())), Report(plan)
+    if place is not None and place.is_printed:
+        list(place.run([run.job(place.folder) for run in runs]))
+        return Report(plan, (), is_complete=True)
     with progress_bar(console) as progress:
-        task = progress.add_task("hard cases", total=len(todo))
+        task = progress.add_task("hard cases", total=len(runs))
+        found: dict[str, Outcome] = {}
         try:
-            for what, job in todo:
-                progress.update(task, description=what)
-                found = (*report.outcomes, job())
-                report = Report(plan, found, len(found) == len(todo))
-                progress.advance(task)
+            ends = _here(runs, partial(progress.update, task)) if place is None else _there(runs, place)
+            for name, outcome in ends:
+                found[name] = outcome
+                ordered = tuple(found[run.name] for run in runs if run.name in found)
+                report = Report(plan, ordered, len(found) == len(runs))
+                progress.update(task, completed=len(found), description=name)
                 _keep(keep, report)
         except KeyboardInterrupt:
             _keep(keep, report)
@@ -145,24 +163,60 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None) -> Repo
     return report
 
 
+def _here(runs: Sequence[Run], tell: Callable) -> Iterator[tuple[str, Outcome]]:
+    """Run one after the other in this process; `tell` takes the name of each before it starts."""
+    for run in runs:
+        tell(description=run.name)
+        yield run.name, run.call()
+
+
+def _there(runs: Sequence[Run], place: Place) -> Iterator[tuple[str, Outcome]]:
+    """Run at a place; a run that is lost there fails."""
+    by_name = {run.name: run for run in runs}
+    for name, outcome, error in place.run([run.job(place.folder) for run in runs]):
+        yield name, by_name[name].lost(error) if outcome is None else outcome
+
+
 def _keep(path: Path | None, report: Report) -> None:
     if path is not None:
         write_json(path, report.to_dict())
 
 
-def _jobs(plan: Plan, engines: Sequence[Engine]) -> list[tuple[str, Callable[[], Outcome]]]:
-    """Names and calls of all runs: ours case by case, then other engines on cases that look at motion alone.
+@dataclass(frozen=True)
+class Run:
+    """One case at one setting, in one engine: its name, and the call that returns its outcome."""
 
-    These make the shorter runs: all their settings are tried.
+    name: str
+    case: Case
+    setting: Setting
+    call: Callable[[], Outcome]
+
+    def job(self, folder: Path) -> Job:
+        """Make the job that does the same elsewhere; its command writes a file into `folder`."""
+        on = self.setting
+        words = ["rigid-env", "hard-cases", str(self.case.number), "--accuracy", str(on.accuracy), "--dt", repr(on.dt)]
+        words += [] if on.is_thorough else ["--quick"]
+        path = folder / f"{self.case.number}-{on.accuracy}-{on.dt!r}.json"
+        return Job(self.name, self.call, shlex.join([*words, "--json", str(path)]))
+
+    def lost(self, error: str) -> Outcome:
+        """Return the outcome of a run whose worker was lost."""
+        return Outcome(self.case, OURS, str(self.setting.accuracy), self.setting.dt, Status.FAILS, (), error, 0.0)
+
+
+def _runs(plan: Plan, engines: Sequence[Engine]) -> list[Run]:
+    """List all runs: ours case by case, then other engines on cases that look at motion alone.
+
+    Other engines make the shorter runs, for all their settings are tried.
     """
     short = Setting(dt=plan.dt, is_thorough=False)
     ours = [
-        (f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms", partial(run_case, case, on))
+        Run(f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms", case, on, partial(run_case, case, on))
         for case in plan.cases
         for on in plan.settings
     ]
     theirs = [
-        (f"{case.number} {case.name}, {engine.name}", partial(run_peer, case, engine, short))
+        Run(f"{case.number} {case.name}, {engine.name}", case, short, partial(run_peer, case, engine, short))
         for case in plan.cases
         for engine in engines
         if case.peers

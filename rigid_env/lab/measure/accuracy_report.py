@@ -10,11 +10,12 @@ from rich.console import Console
 
 import physics
 from physics import validation
-from rigid_env.lab.measure import accuracy
+from rigid_env.lab.measure import accuracy, accuracy_jobs
 from rigid_env.lab.measure.accuracy import Found, Ladder
 from rigid_env.lab.measure.accuracy_table import MARKS, answers, goals, make_table, summary
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.mujoco_scene import elsewhere
+from rigid_env.launchers.place import Place
 from rigid_env.terminal import progress_bar
 
 
@@ -61,8 +62,11 @@ def measure_and_show(
     ladder: Ladder | None = None,
     duration: float | None = None,
     shown: Shown | None = None,
+    place: Place | None = None,
 ) -> Report:
     """Measure scenes, and print the table of each once it is measured.
+
+    With `place` each scene is measured there; a place that prints its jobs measures none.
 
     Parameters
     ----------
@@ -75,6 +79,7 @@ def measure_and_show(
     duration : float, optional
         See `accuracy.make_jobs`.
     shown : Shown, optional
+    place : Place, optional
 
     Raises
     ------
@@ -91,14 +96,19 @@ def measure_and_show(
     if engines:
         console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
     jobs = accuracy.make_jobs(scenes, engines, ladder, duration)
-    results = []
+    spread = [] if place is None else accuracy_jobs.make_jobs(jobs, place.folder, tuple(engines), ladder, duration)
+    if place is not None and place.is_printed:
+        list(place.run(spread))
+        return Report((), ladder, is_complete=True)
+    results, total = [], len(jobs) if place else accuracy.run_count(jobs, ladder)
     with progress_bar(console, has_thread=False) as progress, elsewhere():
-        task = progress.add_task("accuracy", total=accuracy.run_count(jobs, ladder))
+        task = progress.add_task("accuracy", total=total)
 
         def tick(what: str) -> None:
             progress.update(task, advance=1, description=what, refresh=True)
 
-        for found in accuracy.run(jobs, ladder, tick):
+        here = place is None
+        for found in accuracy.run(jobs, ladder, tick) if here else accuracy_jobs.found(jobs, place.run(spread), tick):
             results.append(found)
             _show(console, found, shown)
     console.print(MARKS, style="dim")

@@ -1,4 +1,4 @@
-"""Trials as jobs of a Slurm cluster, or of this machine, by submitit."""
+"""Jobs of a Slurm cluster, or of this machine, by submitit."""
 
 from __future__ import annotations
 
@@ -6,38 +6,37 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from agents.launchers.trial import Outcome, run_trial
-from agents.trials import Trial
 from rigid_env.extras import require
+from rigid_env.launchers.job import Ended, Job, run_job
 
 POLL_EVERY = 1.0  # between two looks at the jobs [s]
 MINUTES = 24 * 60  # that a job may take
 
 
-def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = None) -> Iterator[Outcome]:
-    """See `trial.Launch`; `address` is a partition of Slurm, or ``local`` for processes of this machine."""
+def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None = None) -> Iterator[Ended]:
+    """See `job.Launch`; `address` is a partition of Slurm, or ``local`` for processes of this machine."""
     require("submitit", purpose="--launcher submitit")
     import submitit
 
     is_local = address == "local"
-    executor = submitit.AutoExecutor(folder=out / "submitit", cluster="local" if is_local else "slurm")
+    executor = submitit.AutoExecutor(folder=folder / "submitit", cluster="local" if is_local else "slurm")
     executor.update_parameters(timeout_min=MINUTES, cpus_per_task=1)
     if not is_local:
-        executor.update_parameters(slurm_array_parallelism=jobs)
+        executor.update_parameters(slurm_array_parallelism=at_once)
         if address:
             executor.update_parameters(slurm_partition=address)
-    waiting, running = list(trials), {}
+    waiting, running = list(jobs), {}
     while waiting or running:
-        room = jobs - len(running) if is_local else len(waiting)
+        room = at_once - len(running) if is_local else len(waiting)
         batch, waiting = waiting[:room], waiting[room:]
         if batch:
             with executor.batch():
-                made = [executor.submit(run_trial, each.name, each.config, str(out)) for each in batch]
-            running.update(zip((each.name for each in batch), made))
+                made = [executor.submit(run_job, job) for job in batch]
+            running.update(zip((job.name for job in batch), made))
         for name in [name for name, job in running.items() if job.done()]:
             job = running.pop(name)
             try:
                 yield job.result()
             except Exception as error:  # of a job that was lost: what submitit raises is its own
-                yield Outcome(name, None, str(error).strip().splitlines()[-1])
+                yield Ended(name, None, str(error).strip().splitlines()[-1])
         time.sleep(POLL_EVERY if running else 0.0)

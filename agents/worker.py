@@ -1,0 +1,60 @@
+"""One trial of a sweep, as a worker runs it."""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from agents.algorithms import make_training_env
+from agents.config import RunConfig, RunInUse
+from agents.run import run_or_resume
+from agents.training import Interrupted
+from agents.trials import Trial
+from rigid_env.launchers.job import Job
+
+PATIENCE = 60.0  # for a folder that a lost worker still holds [s]
+
+
+def make_job(trial: Trial, out: Path) -> Job:
+    """Make the job that runs a trial in its folder in `out`, or goes on with it."""
+    call = partial(run_trial, trial.name, trial.config, str(out))
+    return Job(trial.name, call, trial.command(out), partial(warm_kernels, trial.config))
+
+
+def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE) -> dict[str, Any]:
+    """Run a trial, or go on with it, and return its result.
+
+    Raises
+    ------
+    RunInUse
+        If another process still holds the folder after `patience` seconds.
+    KeyboardInterrupt
+        Ended by Ctrl-C.
+    Exception
+        Whatever the training raises.
+    """
+    limit, is_told = time.monotonic() + patience, False
+    while True:
+        try:
+            return run_or_resume(config, Path(out) / name, console=Console(quiet=True))
+        except RunInUse:
+            if time.monotonic() >= limit:
+                raise
+            if not is_told:
+                print(f"{name} is in use by another process: waiting for it ...", file=sys.stderr, flush=True)
+                is_told = True
+            time.sleep(0.2)
+        except Interrupted as error:
+            raise KeyboardInterrupt(str(error)) from error
+
+
+def warm_kernels(config: RunConfig) -> None:
+    """Compile or load the kernels of a run's environment."""
+    env = make_training_env(config)
+    env.reset()
+    env.close()
