@@ -1,31 +1,42 @@
 """Policies to compare trained agents with: uniformly random, and the controllers written by hand.
 
-A policy is a function from observations (n, entries) to actions (n, 6).
+A policy is a function from observations (n, entries) to actions (n, axes).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from rigid_env.envs.controllers import AXES, CONTROLLERS, Policy, reach_controller, reorient_controller
+from agents.algorithms import make_vector_env
+from rigid_env.envs.controllers import AXES, CONTROLLERS, Policy, load_controller, reach_controller, reorient_controller
 
 __all__ = ["CONTROLLERS", "Policy", "baseline_policy", "random_policy", "reach_controller", "reorient_controller"]
 
 
-def random_policy(seed: int = 0) -> Policy:
+def random_policy(seed: int = 0, axes: int = AXES) -> Policy:
     """Actions drawn uniformly from the action space.
 
     Parameters
     ----------
     seed : int
+    axes : int
+        Numbers of an action.
 
     Returns
     -------
     callable
-        (n, entries) float32 to (n, 6) float32.
+        (n, entries) float32 to (n, axes) float32.
     """
     generator = np.random.default_rng(seed)
-    return lambda observations: generator.uniform(-1.0, 1.0, (len(observations), AXES)).astype(np.float32)
+    return lambda observations: generator.uniform(-1.0, 1.0, (len(observations), axes)).astype(np.float32)
+
+
+def action_size(env_id: str) -> int:
+    """Return how many numbers an action of an environment has."""
+    env = make_vector_env(env_id, 1)
+    size = env.single_action_space.shape[0]
+    env.close()
+    return size
 
 
 def baseline_policy(name: str, env_id: str, seed: int = 0) -> Policy:
@@ -48,9 +59,9 @@ def baseline_policy(name: str, env_id: str, seed: int = 0) -> Policy:
         On an unknown name, or an environment without a controller.
     """
     if name == "random":
-        return random_policy(seed)
+        return random_policy(seed, action_size(env_id))
     if name != "controller":
         raise ValueError(f"baseline is {name!r}; allowed are 'random' and 'controller'")
     if env_id not in CONTROLLERS:
         raise ValueError(f"baseline is 'controller', env is {env_id!r}; allowed are {', '.join(CONTROLLERS)}")
-    return CONTROLLERS[env_id]
+    return load_controller(env_id)

@@ -1,4 +1,4 @@
-"""Hand-written controllers for the block's tasks.
+"""Hand-written controllers: where each stands, and those of the block's two tasks.
 
 A controller is a function from observations (n, entries) to actions (n, 6). It sees what an agent sees, and knows the
 block's observation table (see `rigid_env.envs.block_reach`), nothing else.
@@ -6,6 +6,7 @@ block's observation table (see `rigid_env.envs.block_reach`), nothing else.
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 
 import numpy as np
@@ -104,7 +105,15 @@ def reorient_controller(observations: np.ndarray) -> np.ndarray:
     return actions
 
 
-CONTROLLERS: dict[str, Policy] = {
-    "rigid_env/BlockReach-v0": reach_controller,
-    "rigid_env/BlockReorient-v0": reorient_controller,
+CONTROLLERS = {
+    "rigid_env/BlockReach-v0": "rigid_env.envs.controllers:reach_controller",
+    "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
+    "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
 }
+"""Where the controller of an environment stands, by its id."""
+
+
+def load_controller(env_id: str) -> Policy:
+    """Import the controller of an environment of `CONTROLLERS`."""
+    module, _, name = CONTROLLERS[env_id].partition(":")
+    return getattr(importlib.import_module(module), name)

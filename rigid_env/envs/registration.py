@@ -15,6 +15,9 @@ MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 GOALS = {"BlockReachGoal": 75, "BlockReorientGoal": 75}
 """Tasks with goals, and control steps of their episodes: 7.5 s at the default 50 ms."""
 
+SUITE = {"BlockCurl": 200}
+"""Tasks of `rigid_env.suite`, and control steps of their episodes."""
+
 SCENE_ID = f"{NAMESPACE}/Scene-v0"
 """Environment of any scene: it needs the argument `scene`, whose file may limit the episodes."""
 
@@ -33,26 +36,32 @@ def register_envs() -> None:
         env_id = f"{NAMESPACE}/{name}-v0"
         if env_id in registry:
             continue
-        module = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()  # BlockReach is in block_reach
         register(
             id=env_id,
-            entry_point=f"rigid_env.envs.{module}:{name}Env",
-            vector_entry_point=f"rigid_env.envs.{module}:{name}VectorEnv",
+            entry_point=f"rigid_env.envs.{_file_of(name)}:{name}Env",
+            vector_entry_point=f"rigid_env.envs.{_file_of(name)}:{name}VectorEnv",
             max_episode_steps=steps,
         )
-    for name, steps in GOALS.items():
+    goals = {name: f"rigid_env.tasks.block_goals:{name}" for name in GOALS}
+    suite = {name: f"rigid_env.suite.{_file_of(name)}:{name}" for name in SUITE}
+    for name, task in {**goals, **suite}.items():
         env_id = f"{NAMESPACE}/{name}-v0"
         if env_id not in registry:
             register(
                 id=env_id,
                 entry_point="rigid_env.envs.task:TaskEnv",
                 vector_entry_point="rigid_env.envs.task:TaskVectorEnv",
-                max_episode_steps=steps,
-                kwargs={"task": f"rigid_env.tasks.block_goals:{name}"},
+                max_episode_steps={**GOALS, **SUITE}[name],
+                kwargs={"task": task},
             )
     if SCENE_ID not in registry:
         module = "rigid_env.envs.scene"
         register(SCENE_ID, entry_point=f"{module}:SceneEnv", vector_entry_point=f"{module}:SceneVectorEnv")
+
+
+def _file_of(name: str) -> str:
+    """Return the name of the module of a task: BlockReach is in block_reach."""
+    return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
 def register_task(id: str, task: type | str, **settings: Any) -> None:

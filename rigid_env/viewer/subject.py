@@ -186,12 +186,12 @@ def _policy(env, policy, controller):
 
 def _controller(env, policy):
     """The controller written by hand for an environment."""
-    from rigid_env.envs.controllers import CONTROLLERS
+    from rigid_env.envs.controllers import CONTROLLERS, load_controller
 
     if policy is not None:
         raise ValueError(f"policy is {shown(policy)} with controller=True; allowed is one of the two")
-    names = {id_.split("/")[-1].split("-")[0]: each for id_, each in CONTROLLERS.items()}
+    names = {id_.split("/")[-1].split("-")[0]: id_ for id_ in CONTROLLERS}
     task = type(env.unwrapped.task).__name__
     if task not in names:
         raise ValueError(f"controller is True with {task}; allowed is {', '.join(names)}")
-    return names[task]
+    return load_controller(names[task])

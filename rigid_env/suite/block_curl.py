@@ -1,0 +1,199 @@
+"""BlockCurl: push a stone for half a second, and let it slide to a mark."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import physics
+from rigid_env.tasks import Distribution, Entry, Force, Task
+
+G = 9.81  # [m/s²]
+STRENGTH = 1.5  # longest force over the weight
+PUSHED = 20  # control steps in which the agent pushes
+CONTROL_DT = 0.025  # [s]
+NEAREST, FARTHEST = 1.0, 4.0  # distance of the mark at the start [m]
+FRICTION = (0.15, 0.4)
+TOLERANCE = 0.1  # distance from the mark at rest that is a success [m]
+AT_REST = 1e-3  # speed below which the stone has stopped [m/s]
+EFFORT_PRICE = 0.1  # of the integral of (force over weight)² [1/s]
+LENGTH, SPEED = 5.0, 5.0  # units of the observation [m], [m/s]
+HALVINGS = 50  # of the interval in which the slide's duration is sought: 2^-50 of 10 s
+LONGEST_SLIDE = 10.0  # [s]
+
+
+class Ring(Distribution):
+    """Places x, z on a ring about the origin, each as likely as the other [m]."""
+
+    length, uniforms = 2, 2
+
+    def at(self, shares, drawn):
+        """Places (n, 2) of uniform numbers (n, 2)."""
+        radius = np.sqrt(NEAREST**2 + (FARTHEST**2 - NEAREST**2) * shares[:, 0])
+        angle = 2.0 * np.pi * shares[:, 1]
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+    def describe(self):
+        """Text for tables."""
+        return f"on a ring from {NEAREST:g} to {FARTHEST:g} m about the start"
+
+
+def best_push(distance, speed, friction, left):
+    """Force that brings a stone to rest at a distance with the least effort, in closed form but for one root.
+
+    Pushed for T = `left`, then sliding for a time s, the stone stops with v(T) = μ g s. Of all forces f(t) over the
+    weight that stop it there, Lagrange's condition picks f(t) = κ ((T - t) + s), which falls in a line; with
+
+        μ g s = v + g κ T (T/2 + s) - μ g T
+        distance = v T + g κ (T³/3 + s T²/2) - μ g T²/2 + μ g s²/2
+
+    the first equation gives κ, and the second, which grows with s, gives s.
+
+    Parameters
+    ----------
+    distance, speed, friction, left : (n,) float
+        To the mark [m], towards it [m/s], coefficient, and time that is left to push [s].
+
+    Returns
+    -------
+    force : (n,) float
+        Over the weight, now; negative to brake.
+    effort : (n,) float
+        Integral of its square until the push ends [s].
+    """
+    low, high = np.zeros_like(distance), np.full_like(distance, LONGEST_SLIDE)
+    for _ in range(HALVINGS):
+        slide = 0.5 * (low + high)
+        rise = _rise(slide, speed, friction, left)
+        way = speed * left + G * rise * left**2 * (left / 3 + slide / 2)
+        way += 0.5 * friction * G * (slide**2 - left**2)
+        is_short = way < distance
+        low, high = np.where(is_short, slide, low), np.where(is_short, high, slide)
+    rise = _rise(high, speed, friction, left)
+    effort = rise**2 * ((left + high) ** 3 - high**3) / 3
+    return rise * (left + high), effort
+
+
+def _rise(slide, speed, friction, left):
+    """κ of `best_push` [1/s]."""
+    return (friction * (slide + left) - speed / G) / (left * (left / 2 + slide))
+
+
+def best_return(goal, friction, duration):
+    """Largest return of an episode whose mark is at `goal` (n, 2), with `friction` (n,), pushed for `duration` [s]."""
+    distance = np.linalg.norm(goal, axis=1)
+    _, effort = best_push(distance, np.zeros_like(distance), friction, np.full_like(distance, duration))
+    return 1.0 - EFFORT_PRICE * effort
+
+
+def mark_offset(worlds):
+    """Mark minus centre, x and z, (n, 2) [m]."""
+    return worlds.drawn["goal"] - worlds.pos[:, 0, ::2]
+
+
+class BlockCurl(Task):
+    """Push a stone for half a second, so that it then slides to a mark and stops there.
+
+    ## Description
+
+    A flat block of 20 kg lies on a floor. For 20 control steps (0.5 s) the agent pushes it with a horizontal force of
+    up to 1.5 times its weight, at the centre. Then it slides alone. Friction differs from episode to episode, and the
+    agent is told it. The best push is known in closed form, so that every episode tells how far from it the agent was.
+
+    ## Rewards
+
+    `miss`: minus the distance from the mark [m], once the stone has stopped. `effort`: minus 0.1 times the integral of
+    the squared force over the weight. `success`: 1 for a hit. The largest return is that of `best_return`: a hit with
+    the least effort, for a force that changes freely in time.
+
+    ## Starting State
+
+    At rest at the origin. The mark is on a ring of 1 to 4 m, friction is 0.15 to 0.4.
+
+    ## Episode End
+
+    Once the stone has stopped after the push: success within 0.1 m of the mark, else failure. Truncation after 200
+    control steps (5 s). `info` holds `distance` [m], and `regret`: the largest return less the return so far; it is
+    complete when the episode ends.
+
+    ## Version History
+
+    - v0: first version.
+    """
+
+    scene = physics.Scene(
+        bodies=[physics.Block(size=(1.0, 0.4, 1.0), mass=20.0, pos=(0.0, 0.2, 0.0))],
+        walls=[physics.HalfSpace((0.0, 1.0, 0.0), 0.0)],
+        effects=[physics.Gravity((0.0, -G, 0.0)), physics.Contact(), physics.Friction(FRICTION[1])],
+    )
+    actions = Force(0, STRENGTH, axes="xz")
+    observation = [
+        Entry(("mark x minus centre x", "mark z minus centre z"), "m", -5, 5, mark_offset, LENGTH),
+        Entry(("linear velocity x", "linear velocity z"), "m/s", -5, 5, lambda w: w.linvel[:, 0, ::2], SPEED),
+        Entry("friction", "1", 0, 1, lambda w: w.drawn["friction"]),
+        Entry("share of the push that is left", "1", 0, 1, lambda w: np.maximum(1.0 - w.steps / PUSHED, 0.0)),
+    ]
+    draws = {"goal": Ring(), "friction": FRICTION}
+    memory = {"effort": 1}
+    max_episode_steps = 200
+
+    def measure(self, worlds):
+        """Distance from the mark, and what the agent has lost against the best push so far."""
+        goal, friction = worlds.drawn["goal"], worlds.drawn["friction"]
+        distance = np.linalg.norm(mark_offset(worlds), axis=1)
+        gained = np.where(self._has_stopped(worlds), (distance < TOLERANCE) - distance, 0.0)
+        best = best_return(goal, friction, PUSHED * self.control_dt)
+        return {"distance": distance, "regret": best + EFFORT_PRICE * worlds.memory["effort"] - gained}
+
+    def update(self, worlds):
+        """Add the effort of this step, and take the push away once its time is over."""
+        force = worlds.wrench[:, 0, :3] / worlds.weight[:, :1]
+        worlds.memory["effort"] += self.control_dt * (force**2).sum(axis=1)
+        self.limits[worlds.indices[worlds.steps >= PUSHED]] = 0.0
+
+    def _has_stopped(self, worlds):
+        """(n,) bool: after the push, at rest."""
+        return (worlds.steps >= PUSHED) & (np.linalg.norm(worlds.linvel[:, 0], axis=1) < AT_REST)
+
+    def success(self, worlds):
+        """Stopped on the mark."""
+        return self._has_stopped(worlds) & (worlds.measured["distance"] < TOLERANCE)
+
+    def failure(self, worlds):
+        """Stopped elsewhere."""
+        return self._has_stopped(worlds) & (worlds.measured["distance"] >= TOLERANCE)
+
+    def rewards(self, worlds):
+        """A hit less its effort, or minus the distance."""
+        effort = self.control_dt * ((worlds.wrench[:, 0, :3] / worlds.weight[:, :1]) ** 2).sum(axis=1)
+        return {
+            "miss": np.where(self._has_stopped(worlds), -worlds.measured["distance"], 0.0),
+            "effort": -EFFORT_PRICE * effort,
+            "success": 1.0 * worlds.success,
+        }
+
+    def goal_mark(self, world):
+        """A disc of the tolerance."""
+        x, z = self.drawn["goal"][world]
+        return {"pos": (x, 0.0, z), "radius": TOLERANCE, "reached": False}
+
+
+def controller(observations: np.ndarray) -> np.ndarray:
+    """Play the best push, worked out anew in each control step from where the stone is.
+
+    Parameters
+    ----------
+    observations : (n, 6) float32
+
+    Returns
+    -------
+    (n, 2) float32
+    """
+    offset, velocity = LENGTH * observations[:, 0:2], SPEED * observations[:, 2:4]
+    left = observations[:, 5] * PUSHED * CONTROL_DT
+    distance = np.maximum(np.linalg.norm(offset, axis=1), 1e-6)
+    forward = offset / distance[:, None]
+    speed = (velocity * forward).sum(axis=1)
+    force, _ = best_push(distance, speed, observations[:, 4], np.maximum(left, CONTROL_DT))
+    across = velocity - speed[:, None] * forward
+    push = force[:, None] * forward - across / (G * CONTROL_DT)
+    return (push / STRENGTH).clip(-1.0, 1.0).astype(np.float32)
