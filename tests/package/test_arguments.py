@@ -16,6 +16,8 @@ SEEN = {
     "agents/train.py main": "command",
     "physics/scene/bodies.py Block.__init__": "for editors: the dataclass makes another one",
     "rigid_env/cli/exploring.py run": "command",
+    "rigid_env/cli/measuring.py accuracy": "command",
+    "rigid_env/cli/measuring.py hard_cases": "command",
     "rigid_env/cli/viewing.py view": "command",
     "rigid_env/envs/task.py TaskEnv.__init__": "for editors: settings of any name are taken, besides",
     "rigid_env/envs/task.py TaskVectorEnv.__init__": "for editors: settings of any name are taken, besides",
