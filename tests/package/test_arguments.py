@@ -14,6 +14,7 @@ SEEN = {
     "agents/record.py main": "command",
     "agents/sweep.py main": "command",
     "agents/train.py main": "command",
+    "benchmarks/soak.py main": "command",
     "physics/scene/bodies.py Block.__init__": "for editors: the dataclass makes another one",
     "rigid_env/cli/exploring.py run": "command",
     "rigid_env/cli/measuring.py accuracy": "command",
