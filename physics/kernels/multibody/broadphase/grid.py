@@ -19,7 +19,10 @@ BOXES_PER_STRIP = 2.0
 
 @inlined
 def _cut(k, many):
-    """Cut world axis k into strips over the extent of all boxes: (lowest coordinate [m], strips per metre, strips)."""
+    """Cut world axis k into strips over the extent of all boxes.
+
+    Returns (lowest coordinate [m], strips per metre, number of strips).
+    """
     box, count = many.bodies.box, many.bodies.box.shape[0]
     low, high, total = box[0, k], box[0, k + 3], 0.0
     for b in range(count):

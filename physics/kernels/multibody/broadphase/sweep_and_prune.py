@@ -113,7 +113,10 @@ def widest_axis(many):
 
 @inlined
 def _merge(first, middle, last, axis, many):
-    """Merge two adjacent sorted runs of `many.broadphase.order`: [first, middle) and [middle, last)."""
+    """Merge the runs [first, middle) and [middle, last) of `many.broadphase.order` into one sorted run.
+
+    Bodies are sorted by the lower end of their boxes along a world axis.
+    """
     order, merged, box = many.broadphase.order, many.broadphase.merged, many.bodies.box
     i, j = first, middle
     for k in range(first, last):
@@ -183,7 +186,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
 
 @inlined
 def _count_into(pairs, column, count, first, target):
-    """Copy `count` pairs to `target`, sorted by the body in a column (0 or 1) by a stable counting sort.
+    """Copy the first `count` rows of `pairs` to `target`, sorted by their entry in `column` (stable counting sort).
 
     `first` (bodies + 1,) is scratch.
     """

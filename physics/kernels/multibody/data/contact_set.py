@@ -298,7 +298,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
 
 @inlined
 def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
-    """Add the only contact of bodies a and b, given from the side of body `first`, which is a or b.
+    """Add the only contact of bodies a and b, with data given relative to body `first`, which is a or b.
 
     n is the unit normal out of the other body. `on_first` and `on_second` are the points on `first` and on the other
     body, world frame [m]. For `gap`, h and `many` see `add_contact`.
@@ -328,7 +328,7 @@ def _carried_point(b, k, first, side, n, many):
 
 @inlined
 def _turn_frame(k, a, b, many):
-    """Turn the frame of contact k between bodies a and b with the bodies; return its normal, world frame.
+    """Update the frame of contact k for the present poses of its bodies a and b; return its normal, world frame.
 
     A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres. Any
     other normal stays as it is.

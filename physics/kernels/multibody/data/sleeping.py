@@ -31,7 +31,10 @@ from physics.kernels.state.sleeping import (
 
 @inlined
 def wake_group(world, count, group, sleep):
-    """Wake all bodies of a group in a world of `count` bodies; `group` is their entry in column `SLEEP_GROUP`."""
+    """Wake all bodies of a group in a world of `count` bodies.
+
+    `group` is the number of the group, stored in `sleep.rows[:, SLEEP_GROUP]` for each of its bodies.
+    """
     for i in range(world * count, (world + 1) * count):
         if sleep.rows[i, SLEEP_GROUP] == group:
             wake_body(i, sleep)
@@ -101,8 +104,9 @@ def _union_near_pairs(many):
 def put_quiet_groups_to_sleep(world, sleep, many):
     """Put each group of a world to sleep if all its bodies are quiet and its motion does not grow.
 
-    A body is quiet after `WINDOWS_BEFORE_SLEEP` quiet windows in a row. Row `root` of `many.islands.group_motion`
-    gathers the largest displacements of a group in its last two windows, and a flag for bodies that are not quiet.
+    A body is quiet after `WINDOWS_BEFORE_SLEEP` quiet windows in a row. `many.islands.group_motion` gathers, at the
+    root of each group in the union-find forest, the largest displacements of its bodies in the last two windows. A flag
+    there says whether a body of the group is not quiet.
     """
     count, found = many.bodies.state.shape[0], many.islands.group_motion
     first = world * count

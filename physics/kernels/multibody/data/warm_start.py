@@ -114,7 +114,7 @@ def _keep_sleeping(world, h, sleep, memory, many):
 
 @kernel
 def store_warm_impulses(n, world, h, sleep, memory, many):
-    """Store the impulses of the n contacts after a stage of length h [s], as the next warm start.
+    """Store the impulses of the n contacts in `memory` after a stage of length h [s], as the next warm start.
 
     Stored contacts of sleeping bodies come first and stay; contacts beyond the room in `memory` are left out.
     """

@@ -40,9 +40,9 @@ _FIRST_EDGE_FEATURE = 6 * _FEATURES_PER_FACE
 
 @inlined
 def _reference_face(a, b, face, many):
-    """(block with `face`, other block, body axis across the face, sign of the axis towards the other block).
+    """Find the block to which `face` belongs: (block, other block, body axis across the face, sign).
 
-    `face` is numbered as in `box_sat.max_box_face_separation`.
+    `face` is numbered as in `box_sat.max_box_face_separation`. The sign is that of the axis towards the other block.
     """
     if face < 3:
         return a, b, face, math.copysign(1.0, many.narrowphase.relative_axes[FROM_A, 0, face])
@@ -51,7 +51,7 @@ def _reference_face(a, b, face, many):
 
 @inlined
 def _clip_face(a, b, face, many):
-    """Clip the face of the other block opposite to `face` by the sides of `face`: (copy of the polygon, vertices)."""
+    """Clip the opposite face of the other block by the sides of `face`: (copy of the polygon, number of vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
     d, slop = many.bodies.body[r].dims, pair_slop(a, b, many)
@@ -175,7 +175,7 @@ def _add_edge_contact(a, b, edges, gap, h, many):
 def collide_blocks(a, b, margin, h, many):
     """Add the contacts of blocks a and b that are at most `margin` [m] apart; h is the length of the stage [s].
 
-    If a face nearly separates the blocks or does, and a part of the other block is above it, that part touches: no
+    If a face separates the blocks, or nearly so, and a part of the other block is above it, that part touches: no
     product of edges can have a larger separation.
     """
     write_relative_axes(a, b, many)

@@ -43,8 +43,9 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
     """Clip the polygon of `count` vertices in copy `source` into the other copy; return the new number of vertices.
 
     Vertices with sign * coordinate `axis` <= bound stay; `side` is the number of the clipping edge. A vertex outside by
-    at most the slop [m] stays, too. It would otherwise come and go by rounding where two faces end together. It
-    replaces the crossing of its edge, which may be far away along an edge that the side hardly cuts.
+    at most the slop [m] stays, too, since it would otherwise come and go by rounding where two faces end together. It
+    takes the place of the crossing of its edge with the bound, which may be far away if the edge is nearly parallel to
+    it.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0

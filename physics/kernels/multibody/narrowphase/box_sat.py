@@ -15,8 +15,8 @@ from physics.compiler.decorators import inlined
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 
-# Squared sine of the angle between two edges below which they count as parallel: their product then is no axis of its
-# own. It is far above the rounding of the nine products, 1e-16.
+# Squared sine of the angle between two edges below which they count as parallel. Their product is then skipped, since
+# face normals cover its direction. The value is far above the rounding of the nine products, 1e-16.
 PARALLEL_SINE_SQUARED = 1.0e-12
 
 # Cosine of the angle between two face normals, or between the product of two edges and a face normal, above which the
@@ -54,7 +54,7 @@ def write_relative_axes(a, b, many):
 
 @inlined
 def max_box_face_separation(a, b, margin, many):
-    """(separation [m], face) of the face normal along which blocks a and b are farthest apart.
+    """Find the face normal along which blocks a and b are farthest apart: (separation [m], face).
 
     Faces 0 to 2 are those across the axes of a, 3 to 5 those of b. A later face is taken only if it separates by a slop
     more, so that ties go to block a. The search stops at a face that separates by more than `margin` [m].
@@ -80,7 +80,7 @@ def max_box_face_separation(a, b, margin, many):
 
 @inlined
 def max_box_edge_separation(a, b, margin, many):
-    """(separation [m], 3 i + j) of the edge product along which blocks a and b are farthest apart.
+    """Find the edge product along which blocks a and b are farthest apart: (separation [m], 3 i + j).
 
     The product is that of edge direction i of a and edge direction j of b. Of equal separations the first is taken. The
     search stops at a product that separates by more than `margin` [m].

@@ -60,7 +60,10 @@ def ellipsoid_matrix(C, dims):
 
 @inlined
 def ellipsoid_support_point(D, n):
-    """(support function s(n) [m], point with outward normal n) of an ellipsoid with matrix D about its centre."""
+    """Support function and point of an ellipsoid for the unit vector n: (s(n) [m], point with outward normal n).
+
+    D is the ellipsoid's matrix (`ellipsoid_matrix`). The point is relative to the centre.
+    """
     x = D[0] * n[0] + D[1] * n[1] + D[2] * n[2]
     y = D[1] * n[0] + D[3] * n[1] + D[4] * n[2]
     z = D[2] * n[0] + D[4] * n[1] + D[5] * n[2]
@@ -252,9 +255,9 @@ def block_support_point(dims, n, near):
 
 @inlined
 def nearest_on_block(p, d):
-    """(nearest point of the surface, outward unit normal, distance [m]) of a block for a point p in its frame.
+    """Find the point of a block's surface nearest to a point p: (point, outward unit normal, distance [m]).
 
-    d are the block's half edges. The distance is negative for p inside.
+    d are the block's half edges, and all vectors are in its frame. The distance is negative for p inside.
     """
     q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
     w = subtract(p, q)

@@ -91,10 +91,11 @@ def _difference_point(a, b, poses, v, thinner, hulls, many):
 
 @kernel
 def closest_on_simplex(count, many):
-    """Point of a simplex nearest to the origin, and the number of corners that it lies between.
+    """Find the point of a simplex nearest to the origin: (point, number of corners that are kept).
 
     The simplex has `count` corners in `many.narrowphase.simplex`, and a new one after them. Corners that are not needed
-    for the point are removed; the new one is always needed. A tetrahedron that holds the origin gives (0, 0, 0).
+    to form the point are removed; the new one always is needed. If a tetrahedron holds the origin, the point is (0, 0,
+    0).
     """
     S = many.narrowphase.simplex
     w = row_vector(S, count, 0)
@@ -141,7 +142,7 @@ def closest_on_simplex(count, many):
 
 @inlined
 def _core_radius(b, thinner, many):
-    """Radius that the core of body b leaves out [m]: that of a sphere shrunk by `thinner`, 0 for other shapes."""
+    """Radius that is added to the core of body b [m]: that of a sphere shrunk by `thinner`, 0 for other shapes."""
     return many.bodies.body[b].dims[0] - thinner if many.bodies.body[b].shape == SPHERE else 0.0
 
 

@@ -25,7 +25,7 @@ CLIP_SIDE_OFFSET = 64
 
 @inlined
 def _side_plane(which, ring, k, first, last, out, hulls):
-    """(outward unit normal m, m·x) of the plane through side k of a face and along the face's normal `out`.
+    """Plane through side k of a face and along the face's normal `out`: (outward unit normal m, offset m·x).
 
     The face belongs to body `which` of the pair; its corners are `ring[first:last]`.
     """
@@ -41,9 +41,9 @@ def _side_plane(which, ring, k, first, last, out, hulls):
 def _clip_polygon(source, count, m, bound, side, slop, hulls):
     """Clip the polygon of `count` vertices in copy `source` by m·x <= bound: (copy of the result, its vertices).
 
-    m is a unit vector, `side` the number of the clipping edge. A vertex outside by at most the slop [m] stays, too. It
-    would otherwise come and go by rounding where two faces end together. It replaces the crossing of its edge, which
-    may be far away along an edge that the side hardly cuts.
+    m is a unit vector, `side` the number of the clipping edge. A vertex outside by at most the slop [m] stays, too,
+    since it would otherwise come and go by rounding where two faces end together. It takes the place of the crossing of
+    its edge with the bound, which may be far away if the edge is nearly parallel to it.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
@@ -81,8 +81,8 @@ def _has_corner(f, corner, hulls):
 def write_hull_incident_face(which, o, out, many):
     """Write the incident face of body o, number `which` of the pair, into copy 0; return its number of vertices.
 
-    It is a face of o at the corner that is deepest along the direction `out`. Among these faces it is the one whose
-    normal is most opposed to `out`. The most opposed of all faces need not have that corner.
+    It is a face at the corner of o that is farthest against the direction `out`. Among the faces there it is the one
+    whose normal is most opposed to `out`. The most opposed of all faces of o need not have that corner.
     """
     hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):
@@ -104,7 +104,7 @@ def write_hull_incident_face(which, o, out, many):
 
 @inlined
 def clip_incident_face(which, r, o, face, slop, many):
-    """Clip the incident face of body o by the sides of a face of body r: (copy of the polygon, vertices).
+    """Clip the incident face of body o by the sides of a face of body r: (copy of the polygon, number of vertices).
 
     Body r is number `which` of the pair, `face` is counted from 0 in r, and `slop` [m] is as in `_clip_polygon`.
     """

@@ -38,10 +38,10 @@ _NO_ELLIPSOID = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @inlined
 def nearest_on_hull(b, x, many):
-    """(nearest point of the surface, outward unit normal, distance [m]) of hull b for a point x.
+    """Find the point of a hull's surface nearest to a point x: (point, outward unit normal, distance [m]).
 
-    Hull b is number 0 of the pair, x in the coordinates of the pair (`hull_pose`). The distance is negative for x
-    inside, where the shortest way out is through the nearest face. For x outside, the nearest point y is on a face
+    Hull b is number 0 of the pair, and x is in the coordinates of the pair (`hull_pose`). The distance is negative for
+    x inside, where the shortest way out is through the nearest face. For x outside, the nearest point y is on a face
     whose plane is below x: x - y is a combination of the normals of the faces that meet at y, so that one of them
     points towards x.
     """

@@ -1,8 +1,9 @@
 """Contacts of two convex polyhedra: separating axis test, then the clipped face or nearest points of two edges.
 
 As in `box_box`, but for any polygons. The plane that separates two polyhedra best is parallel to a face of one of them,
-or to an edge of each. A pair of edges counts only if their arcs on the sphere of normals cross, one of the arcs
-reversed. Other pairs do not form a face of the Minkowski difference [1]_.
+or to an edge of each. The arc of an edge joins the normals of its two faces on the unit sphere. A pair of edges counts
+only if the arc of one crosses the reversed arc of the other. Other pairs do not form a face of the Minkowski difference
+[1]_.
 
 References
 ----------
@@ -45,7 +46,7 @@ _FIRST_EDGE_FEATURE = 2 * _MAX_FACES * 4 * CLIP_SIDE_OFFSET * CLIP_SIDE_OFFSET
 
 @inlined
 def max_hull_face_separation(which, b, other, far, many):
-    """(separation [m], face) of the face of body b that is farthest from the body `other`.
+    """Find the face of body b that is farthest from the body `other`: (separation [m], face).
 
     Body b is number `which` of the pair. The search stops at a face farther than `far` [m].
     """
@@ -64,7 +65,7 @@ def max_hull_face_separation(which, b, other, far, many):
 
 @inlined
 def hull_edge(which, b, e, many):
-    """(start [m], vector to the end [m], normal of the left face, normal of the right face) of edge e of body b.
+    """Edge e of body b: (start [m], vector to its end [m], normal of the left face, normal of the right face).
 
     Body b is number `which` of the pair; results are in the coordinates of the pair (`hull_pose`).
     """
@@ -93,10 +94,10 @@ def _is_minkowski_face(d, left, right, e, other_left, other_right):
 
 @inlined
 def max_hull_edge_separation(a, b, many):
-    """(separation [m], edge of a, edge of b) of the two edges across which bodies a and b are farthest apart.
+    """Find the two edges across which bodies a and b are farthest apart: (separation [m], edge of a, edge of b).
 
-    The separation is -inf if no pair of edges counts (`_is_minkowski_face`). Body a is number 0 of the pair, b number
-    1.
+    Body a is number 0 of the pair, b number 1. The separation is -inf if no pair of edges counts
+    (`_is_minkowski_face`).
     """
     hulls, best, first, second = many.narrowphase.hulls, -math.inf, 0, 0
     inside = row_vector(hulls.centre, 0, 0)
@@ -206,10 +207,10 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
 def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
-    If a face nearly separates the bodies or does, and a part of the other body is above it, that part touches: no pair
-    of edges can have a larger separation. Else the pair of edges with the largest separation may touch. If their normal
-    is nearly that of the face, the part above the face touches instead, at the separation of the edges, unless it is
-    farther away itself.
+    If a face separates the bodies, or nearly so, and a part of the other body is above it, that part touches: no pair
+    of edges can have a larger separation. Else the pair of edges with the largest separation may touch. If the normal
+    of the edges is nearly that of the face, the part above the face touches instead, at the separation of the edges,
+    unless that part is farther away.
 
     The face of a is preferred unless that of b separates by a slop more, and a face is preferred to edges likewise: a
     choice between equals must not change with rounding. h is the length of the stage [s].

@@ -100,25 +100,25 @@ def _multiply_in_place(A, k, D, b):
 
 @inlined
 def _lane_index(k):
-    """Four truth values, True in lane k only."""
+    """Mask of four truth values: True for lane k only."""
     return Lanes(0.0, 1.0, 2.0, 3.0) == k
 
 
 @inlined
 def _lanes_after(k):
-    """Four truth values, True in the lanes after lane k."""
+    """Mask of four truth values: True for the lanes after lane k."""
     return Lanes(0.0, 1.0, 2.0, 3.0) > k
 
 
 @inlined
 def _component(x, p):
-    """Number p of the six numbers of a column x, given as two halves."""
+    """Number p (0 to 5) of a column x that is given as two halves."""
     return x[0][p] if p < 3 else x[1][p - 3]
 
 
 @inlined
 def _with_component(x, p, value):
-    """Column x, given as two halves, with number p of its six numbers replaced by `value`."""
+    """Column x, given as two halves, with its number p (0 to 5) replaced by `value`."""
     if p < 3:
         return select_lanes(_lane_index(p), value, x[0]), x[1]
     return x[0], select_lanes(_lane_index(p - 3), value, x[1])
@@ -126,7 +126,7 @@ def _with_component(x, p, value):
 
 @inlined
 def _max_below_pivot(x, p):
-    """Largest absolute value of the numbers after number p in a column x, given as two halves."""
+    """Largest absolute value of the numbers after number p (0 to 5) of a column x, given as two halves."""
     if p < 3:
         return max_of_lanes(larger(select_lanes(_lanes_after(p), abs(x[0]), 0.0), abs(x[1])))
     return max_of_lanes(select_lanes(_lanes_after(p - 3), abs(x[1]), 0.0))
@@ -144,10 +144,10 @@ def _eliminate_column(y, p, s, x):
 
 @inlined
 def _gauss_jordan_step(p, least, x, a, b, c, d, e):
-    """Do one Gauss-Jordan step with the pivot in number p of column x; a to e are the other columns of the block.
+    """Do one step of a Gauss-Jordan inversion with the pivot in row p of column x: (least, a, b, c, d, e, x).
 
-    Returns the least margin of all pivots so far above their allowed size (`least` before this step), then the columns
-    a to e and x after the step.
+    a to e are the other five columns of the block. `least` is the smallest margin so far by which a pivot was larger
+    than necessary; negative if one was too small.
     """
     value = _component(x, p)
     s = 1.0 / value

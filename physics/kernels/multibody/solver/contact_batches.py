@@ -1,8 +1,9 @@
-"""Batches of up to four contacts of the same two bodies, a lane for each, for methods with a linear system.
+"""Batches of up to four contacts of the same two bodies, for methods with a linear system.
 
 Two blocks that touch with a face have several contacts. All of them need the same computation, and their effects on the
-bodies add up. So a batch reads the bodies' twists once, and sums forces, moments and blocks of the system before it
-writes them. Lanes that are left over repeat the last contact with the weight 0.
+bodies add up. So a batch does the computation for its contacts at once, one in each lane of `Lanes`. It reads the
+bodies' twists once, and sums forces, moments and blocks of the system before it writes them. Lanes that are left over
+repeat the last contact with the weight 0.
 
 When an island is prepared, the data of its contacts are copied into the batches. Field f of batch g is
 `many.newton.lanes[g, 4 f : 4 f + 4]`, one number for each contact.
@@ -119,7 +120,10 @@ def _fill_batch(g, i, n, many):
 
 @kernel
 def batch_contacts(first, last, many):
-    """Batch the contacts `many.islands.contacts[first:last]` of an ordered island; return False if room is short."""
+    """Sort the contacts `many.islands.contacts[first:last]` of an island into batches; return False if room is short.
+
+    The bodies of the island must be ordered for elimination (`minimum_degree.order_elimination`).
+    """
     count, i = 0, first
     while i < last:
         a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]

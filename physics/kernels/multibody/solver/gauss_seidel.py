@@ -70,7 +70,7 @@ _NO_HISTORY = -2
 
 @inlined
 def _is_up_to_date(i, a, b, many):
-    """True if neither body a nor body b (b < 0: a wall) has been pushed since contact or contact row i was visited."""
+    """True if neither body a nor body b (b < 0: a wall) has been pushed since the last visit of their contact i."""
     return many.sweeps.visited[i] >= many.sweeps.pushed[a] and (
         b < 0 or many.sweeps.visited[i] >= many.sweeps.pushed[b]
     )
@@ -179,10 +179,9 @@ def _as_velocity(i, d, many):
 
 @inlined
 def _save_history(i, p, marks, many):
-    """Store the impulse p of row i, before it changes, as that of two earlier moments.
+    """Store the impulse p of contact row i as its value at two earlier moments, if it has not changed since.
 
-    `marks` are the numbers of the last visits before these moments. An impulse is stored only if row i has not been
-    visited since the moment.
+    `marks` are the numbers of the last visits before the two moments.
     """
     if many.sweeps.visited[i] <= marks[0]:
         put_vector(many.sweeps.impulse_4_sweeps_ago, i, 0, p)
@@ -244,8 +243,8 @@ def _contraction_ratio(count, marks, many):
 def _extrapolate(count, ratio, number, marks, small, many):
     """Continue the last change of the impulses as a geometric series with this ratio, and add the rest of the series.
 
-    The impulses are projected into their cones, and the motion of the bodies is updated. Bodies whose impulses change
-    by more than `small` [m/s] are marked as pushed in the visit `number`. `count` and `marks` are as in
+    The impulses are projected into their cones, and the motion of the bodies is updated. Bodies at contacts whose
+    impulses change by more than `small` [m/s] are marked as pushed in the visit `number`. `count` and `marks` are as in
     `_contraction_ratio`.
     """
     s = ratio / (1.0 - ratio)

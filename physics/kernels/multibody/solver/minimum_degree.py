@@ -32,7 +32,7 @@ def _add_neighbour(a, b, many):
 
 @inlined
 def _mark_neighbours(a, mark, many):
-    """Write the stamp `mark` to body a and to all its neighbours that are not eliminated yet."""
+    """Write the stamp `mark` to body a and to all bodies in its list of neighbours."""
     many.system.mark[a] = mark
     k = many.system.head[a]
     while k != _NO_ENTRY:

@@ -2,10 +2,10 @@
 
 A solve stops once its residual is within a goal, and so leaves small velocities. The next stage has to stop them, and
 its impulses hold the loads and stop motion that is over afterwards. These impulses are the warm start of the stage that
-follows. It begins with velocities 2 v' - v, for velocities v' now and v a stage ago. If sweeps leave a share s of them,
-the velocities evolve like zᵏ with z² - 2 s z + s = 0 and |z| = √s. They would vanish, but within the goal nothing is
-swept, and they grow again. So a resting pile would go on moving at a few times the goal, each body in a cycle of its
-own, and a hard problem would be solved anew in each cycle.
+follows. That stage begins with velocities 2 v' - v, for velocities v' now and v a stage ago. If sweeps leave a share s
+of them, the velocities evolve like zᵏ over k stages, with z² - 2 s z + s = 0 and |z| = √s. They would vanish, but
+within the goal nothing is swept, and they grow again. So a resting pile would go on moving at a few times the goal,
+each body in a cycle of its own, and a hard problem would be solved anew in each cycle.
 
 An island is left alone if every body keeps its velocity to a small share of the goal: loads and impulses balance. An
 island in which every contact sticks reaches this by one linear system, and for long; other islands are swept. Under

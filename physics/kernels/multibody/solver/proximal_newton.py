@@ -62,7 +62,7 @@ MIN_NEWTON_STEPS = 12
 
 @inlined
 def _apply_newton_direction(part, many):
-    """Solve the factored system for the defect, and subtract the solution from the twists of the island."""
+    """Solve the factored system for the defect, and subtract the solution from the twists of the island `part`."""
     _, _, begin, end = part
     solve_factored(begin, end, many.newton.defect, many)
     for i in range(begin, end):
@@ -103,7 +103,7 @@ def _newton_step(part, rho, norm, many):
 
 @inlined
 def _apply_impulses(part, many):
-    """Copy the impulses in the batches to their contacts, and compute the twists that they cause."""
+    """Copy the impulses in the batches to the contacts of the island `part`, and compute the twists they cause."""
     _, _, begin, end = part
     for i in range(begin, end):
         b = many.islands.bodies[i]
@@ -133,7 +133,10 @@ def _save_impulses(many):
 
 @inlined
 def _accept_trial(part, many):
-    """Take over the impulses p(x) of the last `compute_defect`, projected on the cones, and the twists they cause."""
+    """Take over the impulses p(x) of the last `compute_defect`, projected on the cones, and the twists they cause.
+
+    `part` is the island, as in `newton_contacts`.
+    """
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(
             g,
@@ -146,7 +149,7 @@ def _accept_trial(part, many):
 
 @inlined
 def _restore_impulses(part, many):
-    """Restore the best impulses so far, in batches and contacts, and the twists that they cause."""
+    """Restore the best impulses so far of the island `part`, and the twists that they cause."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(g, of.PROX_IMPULSE, of.batch_vector(g, of.PROX_BEST, many), many)
     _apply_impulses(part, many)
@@ -173,7 +176,7 @@ def _proximal_round(part, rho, enough, limit, many):
 
 @inlined
 def _heaviest(part, many):
-    """Largest mass among the bodies of an island [kg]."""
+    """Largest mass among the bodies of the island `part` [kg]."""
     mass = 0.0
     for i in range(part[2], part[3]):
         mass = max(mass, many.bodies.body[many.islands.bodies[i]].mass)
@@ -198,7 +201,7 @@ def prepare_system(part, sweeps, worth, fewest, many):
 
 @inlined
 def save_best(part, many):
-    """Save the present impulses of an island as the best that any method has found."""
+    """Save the present impulses of the island `part` as the best that any method has found."""
     for i in range(part[0], part[1]):
         put_vector(
             many.contacts.best_impulse,
@@ -210,7 +213,7 @@ def save_best(part, many):
 
 @inlined
 def restore_best(part, many):
-    """Restore the best impulses of an island that any method has found, and the twists that they cause."""
+    """Restore the best impulses that any method has found for the island `part`, and the twists they cause."""
     for i in range(part[2], part[3]):
         for c in range(TWIST_DOFS):
             many.bodies.twist[many.islands.bodies[i], c] = many.bodies.free_twist[many.islands.bodies[i], c]
@@ -222,7 +225,7 @@ def restore_best(part, many):
 
 @inlined
 def is_every_contact_pushing(part, many):
-    """True if all contacts of an island push; else they cannot all stick."""
+    """True if all contacts of the island `part` push; else they cannot all stick."""
     for i in range(part[0], part[1]):
         if not many.contacts.impulse[many.islands.contacts[i], 0] > 0.0:
             return False

@@ -32,7 +32,7 @@ def cone_determinant(a):
 
 @inlined
 def nt_scaling(p, u):
-    """(W, λ, 1/√det λ) of the Nesterov-Todd scaling W p = W⁻¹ u = λ, for vectors p and u inside the cone.
+    """Nesterov-Todd scaling W p = W⁻¹ u = λ of vectors p and u inside the cone: (W, λ, 1/√det λ).
 
     W is the tuple (w₀, w₁, w₂, η) of the module.
     """

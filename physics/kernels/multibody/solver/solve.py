@@ -123,7 +123,7 @@ def reset_body_to_free(b, many):
 
 @inlined
 def clear_island_impulses(part, many):
-    """Set the impulses of an island to zero, and its twists to those without impulses.
+    """Set the impulses of the island `part` to zero, and its twists to those without impulses.
 
     `part` is as in `proximal_newton.newton_contacts`.
     """
@@ -191,7 +191,7 @@ def sweep_as_fallback(part, friction, residual, goal, limit, many):
 
 @inlined
 def is_island_inactive(part, goal, many):
-    """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without impulses."""
+    """True if no contact of the island `part` pushes, and none opens faster than `goal` [m/s] without impulses."""
     for i in range(part[0], part[1]):
         k = many.islands.contacts[i]
         if many.contacts.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
@@ -201,10 +201,10 @@ def is_island_inactive(part, goal, many):
 
 @inlined
 def _is_swept_first(part, goal, scale, many):
-    """True if an island is first solved by sweeps: it has one contact, or is in an impact with a coarse tolerance.
+    """True if the island `part` is first solved by sweeps: it has one contact, or is in a coarsely solved impact.
 
-    `goal` is the residual to reach, `scale` the speed it is relative to [m/s]. An impact starts without impulses, and
-    involves only the few contacts near it.
+    `goal` is the residual to reach, `scale` the speed it is relative to [m/s]. Impacts are swept first if their
+    tolerance is coarse. They start without impulses, and involve only the few contacts near them.
     """
     is_impact = many.settings[0].is_resting_stage == 0
     return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
@@ -212,7 +212,7 @@ def _is_swept_first(part, goal, scale, many):
 
 @kernel
 def solve_island(part, friction, scale, residual, goal, deep, many):
-    """Solve one island: (iterations, residual [m/s], method).
+    """Solve the contact problem of one island: (iterations, residual [m/s], method).
 
     `residual` is that of the impulses to start from, `goal` the residual to reach, and `scale` the speed that residuals
     are relative to, all in m/s. If all contacts stick, the island is solved to `deep` [m/s]. `part` and `friction` are

@@ -22,7 +22,7 @@ from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, are_all_finite, read_state
 
-# Length of a substep in units: the shortest part that is tried first.
+# Units in a substep. The shortest part is one unit long at first.
 _UNITS_PER_SUBSTEP = 2**24
 
 # Allowed error of a part, in tolerances of the contact problem. The residual of a solve changes velocities by a few

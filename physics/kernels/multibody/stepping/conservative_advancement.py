@@ -57,9 +57,10 @@ _ARRIVAL_FRACTION = 0.5
 def write_spin_bounds(h, offset_frame, many):
     """Write bounds of |ω| [rad/s] for bodies that may turn far within h [s], 0 for others; return whether any may.
 
-    They are written to `many.bodies.spin_bound`. A cheap test settles most bodies: loads raise |ω| by at most h times a
-    body's acceleration over its radius. While a body turns by less than `FAR_TURN`, its spin grows by less than a
-    factor of √2 (see `conservative_advancement.spin_bound`).
+    The bounds are written to `many.bodies.spin_bound`. `offset_frame` is a switch of `state.groups.FlightSwitches`. A
+    cheap test settles most bodies: loads raise |ω| by at most h times a body's acceleration over its radius. While a
+    body turns by less than `FAR_TURN`, its spin grows by less than a factor of √2 (see
+    `conservative_advancement.spin_bound`).
     """
     least, found = FAR_TURN, False
     if many.settings[0].is_error_controlled == 1:
@@ -99,10 +100,11 @@ def clear_spin_bounds(many):
 
 @inlined
 def _contact_side(b, y, n, offset_frame, many):
-    """(geometric centre, rotation matrix, arm of the centre, velocity along n, n x ω) of body b in a state y.
+    """Data of body b in a state y for `_gap_bound` along the unit vector n, of which there are five.
 
-    The arm leads from the centre of mass to the geometric centre, world frame [m]. n x ω is 0 for a sphere about its
-    centre of mass, whose rotation moves no surface.
+    They are the geometric centre, the rotation matrix, the arm from the centre of mass to the geometric centre (world
+    frame), the velocity along n, and n x ω. The last is 0 for a sphere about its centre of mass, whose rotation moves
+    no surface.
     """
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -189,7 +191,7 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 @inlined
 def _turning_acceleration(b, h, offset_frame, many):
-    """Bound of the acceleration that the rotation of body b gives to its points within h [s], in m/s²."""
+    """Bound of the acceleration [m/s²] that the rotation of body b gives to its points within h [s]."""
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
@@ -258,7 +260,11 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def safe_stage_length(h, gyroscopic, offset_frame, hulls, many):
-    """Time, at most h, that a stage may take so that no body that turns far passes through another or a wall [s]."""
+    """Time, at most h, that a stage may take so that no body that turns far passes through another or a wall [s].
+
+    `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`; `hulls` is None if the scene has
+    none.
+    """
     first = h
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.spin_bound[b] > 0.0:

@@ -95,7 +95,7 @@ def impact_speed_limit(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """True if contact k touches, or another contact of the same pair in the direction `step` (1 or -1) of the set."""
+    """True if contact k touches, or any contact of the same pair that comes after it in steps of `step`, 1 or -1."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     least = arrival_gap(a, b, many)
     while 0 <= k < many.counts[NUM_CONTACTS] and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
@@ -109,7 +109,7 @@ def _pair_touches(k, step, many):
 def is_left_to_advancement(k, many):
     """True if `conservative_advancement` finds the time of impact of contact k, because a body turns far.
 
-    It serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
+    That module serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)):
@@ -131,7 +131,7 @@ def is_impact_ahead(k, h, many):
 
 @inlined
 def _impact_target(k, h, many):
-    """(target normal velocity of touching contact k in an impact [m/s], whether the contact causes the impact).
+    """Target of touching contact k in an impact: (normal velocity [m/s], whether the contact causes the impact).
 
     A contact that bounces, or that leaves, has the target -e times its speed. For a leaving contact this allows a
     reversal, as in Moreau's law; without it a struck chain could gain energy. Any other contact has the target 0. h is
@@ -145,11 +145,11 @@ def _impact_target(k, h, many):
 
 @inlined
 def _distant_target(k, h, is_last, many):
-    """(target normal velocity of open contact k [m/s], whether it must be braked in the air at once).
+    """Target of open contact k: (normal velocity [m/s], whether the contact must be braked in the air at once).
 
-    The target closes the gap within h [s], the time left of the substep. The contact is unconstrained if a later stage
-    ends at its time of impact. In the last stage of a substep (`is_last`) none does, except those of bodies that turn
-    far.
+    The target closes the gap within h [s], the time left of the substep. If a later stage ends at its time of impact,
+    the contact is unconstrained: it gives no impulse in this stage. In the last stage of a substep (`is_last`) this
+    holds for no contact, except those of bodies that turn far.
     """
     goal = -(many.contacts.gap[k] + parted_slack(k, many)) / h
     if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):

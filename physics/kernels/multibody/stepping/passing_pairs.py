@@ -115,7 +115,7 @@ def _is_stopping(k, h, many):
 
 @inlined
 def _end_pose(b, h, gyroscopic, offset_frame, many):
-    """(geometric centre [m], rotation matrix) of body b after h [s] of motion at constant momenta."""
+    """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
     x, q, v, L = read_state(many.bodies.state, b)
     R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
     x = add_scaled(x, h, v)
@@ -160,7 +160,8 @@ def _have_point_in_common(k, now, later, thinner, hulls, many):
     """True if the two bodies of contact k, shrunk by `thinner` [m], certainly overlap in the later poses.
 
     Each body carries its contact point along. The test asks whether both bodies hold the middle between these two
-    points. They may overlap even if it fails. `now` and `later` are pairs of poses (geometric centre, rotation matrix).
+    points. If it fails, the bodies may still overlap. `now` and `later` are pairs of poses (geometric centre, rotation
+    matrix).
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     (c, R), (d, S) = now
@@ -176,7 +177,7 @@ def _have_point_in_common(k, now, later, thinner, hulls, many):
 
 @kernel
 def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
-    """(unit vector n out of the second body, whether n parts the bodies of contact k throughout h [s]).
+    """Find a direction that parts the bodies of contact k throughout h [s]: (unit vector out of the second, found).
 
     The bodies are shrunk by `thinner` [m] on all sides.
     """
@@ -195,7 +196,7 @@ def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def _gap_along(a, b, n, hulls, many):
-    """(gap [m], point of body a, point of body b): gap and nearest points along the unit vector n out of b.
+    """Gap of bodies a and b along the unit vector n out of b: (gap [m], nearest point of a, nearest point of b).
 
     The points are in the world frame [m].
     """
@@ -295,7 +296,8 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
 def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     """Replace the contacts of each pair that passes within h [s] by one along a plane that parts the two bodies.
 
-    n is the number of contacts in the set; the new number is written to `many.counts[NUM_CONTACTS]`.
+    n is the number of contacts in the set; the new number is written to `many.counts[NUM_CONTACTS]`. `gyroscopic` and
+    `offset_frame` are switches of `state.groups.FlightSwitches`; `hulls` is None if the scene has none.
     """
     _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0

@@ -251,7 +251,8 @@ def _correct_once(n, offset_frame, many):
 def correct_positions(n, offset_frame, many):
     """Move the bodies of the n contacts apart where they overlap by more than the slop.
 
-    A correction repeats while the deepest penetration is above `_DEEP_SLOPS` and decreases.
+    A correction repeats while the deepest penetration is above `_DEEP_SLOPS` and decreases. `offset_frame` is a switch
+    of `state.groups.FlightSwitches`.
     """
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:

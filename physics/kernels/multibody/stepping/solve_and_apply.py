@@ -48,8 +48,8 @@ def _balance_moments(k, a, b, p, many):
     """Correct the angular momenta of bodies a and b for a contact k whose points on them differ.
 
     The impulse p at one point and -p at the other have a moment together, which would change the total angular
-    momentum. Both bodies take up a part of it, in proportion to their m r² (mass, bounding radius). Other contacts have
-    one point.
+    momentum. Both bodies take up a part of it, in proportion to their m r² (mass, bounding radius). At contacts that
+    are not `PARTED` both points coincide.
     """
     x = add_scaled(row_vector(many.bodies.state, a, at.POS), 1.0, row_vector(many.contacts.arm, k, 0))
     y = add_scaled(row_vector(many.bodies.state, b, at.POS), 1.0, row_vector(many.contacts.arm, k, 3))
