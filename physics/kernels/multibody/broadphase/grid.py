@@ -58,7 +58,7 @@ def body_strips(b, u, v, cuts, many):
 
 @inlined
 def _count_entries(u, v, cuts, many):
-    """Count the bodies of column c in `many.broadphase.first_entry[c + 1]`; return the sum over all columns.
+    """Count the bodies in each grid column c, in `many.broadphase.first_entry[c + 1]`; return the sum of the counts.
 
     For u, v and `cuts` see `body_strips`.
     """

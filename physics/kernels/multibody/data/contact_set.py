@@ -125,10 +125,9 @@ def pair_slop(a, b, many):
 
 @inlined
 def parted_slack(k, many):
-    """Depth by which contact k may close beyond its gap [m]; 0 unless its owner is `PARTED`.
+    """Depth to which contact k may close beyond its gap [m]: `DEEP_SHARE` slops if its owner is `PARTED`, else 0.
 
-    A parted contact belongs to bodies that pass each other, and `stepping.passing_pairs` takes them thinner by this
-    depth.
+    The bodies of a `PARTED` contact pass each other, and `stepping.passing_pairs` takes them thinner than they are.
     """
     if many.contacts.owner[k] != PARTED:
         return 0.0

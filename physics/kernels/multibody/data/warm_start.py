@@ -33,13 +33,16 @@ def _contact_column(k):
 
 @inlined
 def _hash_slot(contact_id, table):
-    """Slot of the hash table at which the search for an id begins (Knuth's multiplicative method)."""
+    """Slot of the hash table `table` at which the search for an id begins (Knuth's multiplicative method)."""
     return ((contact_id * 2654435761) >> 16) & (table.shape[0] - 1)
 
 
 @inlined
 def _find_remembered(contact_id, world, memory, table):
-    """Index of the contact with this id among the stored contacts of a world, found in the hash table; -1: none."""
+    """Index of the contact with this id among the stored contacts of a world; -1: none.
+
+    It is looked up in the hash table `table`.
+    """
     at = _hash_slot(contact_id, table)
     while table[at] >= 0:
         if memory[world, _contact_column(table[at]) + WARM_CONTACT_ID] == contact_id:
@@ -50,7 +53,7 @@ def _find_remembered(contact_id, world, memory, table):
 
 @inlined
 def _index_ids(world, memory, table):
-    """Enter the stored contacts of a world into the empty hash table."""
+    """Enter the contacts of a world that are stored in `memory` into the empty hash table `table`."""
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
@@ -60,7 +63,10 @@ def _index_ids(world, memory, table):
 
 @inlined
 def _clear_ids(world, memory, table):
-    """Empty the hash table by removing the stored contacts of a world, since most of its slots are free."""
+    """Empty the hash table `table` again, by removing the contacts of a world that are stored in `memory`.
+
+    This is faster than to clear every slot, since most slots are free.
+    """
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
@@ -70,10 +76,11 @@ def _clear_ids(world, memory, table):
 
 @kernel
 def load_warm_impulses(n, world, h, friction, memory, many):
-    """Write the warm start: impulses of the n contacts of the set from those stored at the last stage.
+    """Write the warm start: impulses of the n contacts of the set, from those stored in `memory` at the last stage.
 
     Impulses are scaled from the last stage's length to h [s], the length of this one. A contact that was not stored
-    starts from zero. Without friction (`friction` is None) only normal impulses are taken.
+    starts from zero. Without friction (`friction` is None) only normal impulses are taken. `world` is the index of the
+    world.
     """
     length, table = memory[world, WARM_STAGE_LENGTH], many.contacts.id_table
     scale = h / length if length > 0.0 else 0.0

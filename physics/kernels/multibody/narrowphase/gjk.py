@@ -1,7 +1,7 @@
 """Distance of two convex bodies in any poses, by Gilbert, Johnson and Keerthi's algorithm on support functions.
 
 The differences of points of body a and body b fill a convex body, the Minkowski difference A - B. Its point v nearest
-to the origin is the shortest vector between the bodies. Each iteration finds w, the point of A - B farthest against v.
+to the origin is the shortest vector between the bodies. Each iteration finds w, the point of A - B farthest along -v.
 It adds w to a simplex and replaces v by the simplex's point nearest to the origin. The distance is between the bound
 v·w/|v| and |v|. A sphere is replaced by its centre, and its radius is subtracted at the end, so that its distance is
 exact.
@@ -77,9 +77,10 @@ def _core_point(b, x, R, k, thinner, hulls, many):
 
 @inlined
 def _difference_point(a, b, poses, v, thinner, hulls, many):
-    """Point of the Minkowski difference A - B that reaches farthest against v, from the cores of bodies a and b.
+    """Point of the Minkowski difference A - B that reaches farthest along -v, from the cores of bodies a and b.
 
-    `poses` has (geometric centre, rotation matrix) of a and of b. For `thinner` and `hulls` see `support_point`.
+    `poses` has (geometric centre, rotation matrix) of a and of b. The core of a sphere is its centre, that of another
+    body the body shrunk by `thinner` [m]. `hulls` is None if the scene has no hulls.
     """
     one, other = poses
     x, y = subtract(one[0], other[0]), (0.0, 0.0, 0.0)

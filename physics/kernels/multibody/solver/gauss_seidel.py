@@ -140,10 +140,11 @@ def sweep_normals(first, last, residual, goal, limit, many):
 
 @inlined
 def _solve_one_contact(W, V, mu, step, p, u, goal):
-    """Impulse of a contact that solves it alone, from its impulse p and its velocity error u at p.
+    """New impulse of one contact that solves it while all other impulses stay.
 
-    W is the contact's Delassus block and V its inverse, as (00, 01, 02, 11, 12, 22). `mu` is the friction coefficient,
-    `step` is 1/λ_max of the tangential part of W, and `goal` the allowed residual [m/s].
+    p is its present impulse and u its velocity error at p. W is the contact's Delassus block and V its inverse, as (00,
+    01, 02, 11, 12, 22). `mu` is the friction coefficient, `step` is 1/λ_max of the tangential part of W, and `goal` the
+    allowed residual [m/s].
     """
     own = qt.symmetric_matvec(W, p)
     b = subtract(u, own)

@@ -61,7 +61,7 @@ _SLIP_SHRINK, _SLIP_GROWTH = 0.2, 2.0
 
 @inlined
 def _units(g, many):
-    """Diagonal of S for the contacts of batch g: (normal entry, tangential entry)."""
+    """Diagonal of the matrix S of the module, for the contacts of batch g: (normal entry, tangential entry)."""
     return of.batch_field(g, of.IPM_UNIT, many), of.batch_field(g, of.IPM_UNIT + 1, many)
 
 
@@ -79,7 +79,7 @@ def _unscaled_impulse(s, p):
 
 @inlined
 def _write_units(g, many):
-    """Write the diagonal of S for the contacts of batch g: (1/μ, 1), or (1, 0) without friction."""
+    """Write the diagonal of the matrix S of the module for batch g: (1/μ, 1), or (1, 0) without friction."""
     mu = of.batch_field(g, of.LANE_MU, many)
     of.put_batch_field(g, of.IPM_UNIT, select_lanes(mu > 0.0, 1.0 / mu, 1.0), many)
     of.put_batch_field(g, of.IPM_UNIT + 1, select_lanes(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
@@ -87,7 +87,10 @@ def _write_units(g, many):
 
 @inlined
 def _set_starting_point(start, many):
-    """Set p̂ and û of all contacts to a point inside the cones by about `start` [m/s], near the present impulses."""
+    """Set the scaled impulses p̂ and velocities û of all contacts to a point inside the cones (see the module).
+
+    It is inside by about `start` [m/s], and near the present impulses.
+    """
     for g in range(many.counts[NUM_BATCHES]):
         _write_units(g, many)
         s, p = _units(g, many), of.gather_batch(g, many.contacts.impulse, many)
@@ -118,7 +121,8 @@ def _add_batch_matrix(g, s, w, x, y, many):
 def _scale_batch(g, share, many):
     """Compute the scaling of batch g, and add its matrix and right side to the system: (p̂·û, residual [m/s]).
 
-    Both results have a number for each contact. `share` is the share of the slip direction d that the matrix includes.
+    Both results have a number for each contact; p̂ and û are its scaled impulse and velocity (see the module). `share`
+    is the share of the slip direction d that the matrix includes.
     """
     s, p, u = _units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many), of.batch_vector(g, of.IPM_VELOCITY, many)
     v = of.batch_velocity_error(g, many)
@@ -183,9 +187,10 @@ def _batch_twist_step(g, s, many):
 def _find_step_length(part, is_corrected, many):
     """Compute the changes dp̂ and dû for the change of twists in `many.newton.change`: (step, product).
 
-    The step, at most 1, is the largest that stays inside all cones. The product is the mean p̂·û of a contact after
-    that step. The changes satisfy W dp̂ + W⁻¹ dû = f - λ, where f is the corrector (`IPM_CORRECTION`) if
-    `is_corrected`, else 0. The product is right only for f = 0.
+    p̂ and û are the scaled impulse and velocity of a contact (see the module). The step, at most 1, is the largest that
+    stays inside all cones. The product is the mean p̂·û of a contact after that step. The changes satisfy W dp̂ + W⁻¹
+    dû = f - λ, where f is the corrector (`IPM_CORRECTION`) if `is_corrected`, else 0. The product is right only for f =
+    0.
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # lower bounds of 1/t, a lane each
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)
@@ -217,7 +222,7 @@ def _find_step_length(part, is_corrected, many):
 
 @inlined
 def _set_right_side(part, many):
-    """Copy the right side of `_prepare_predictor` to `many.newton.change`, for the bodies of the island."""
+    """Copy the right side of `_prepare_predictor` to `many.newton.change`, for the bodies of the island `part`."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(COLUMN_SIZE):
@@ -256,7 +261,7 @@ def _move_inside_cone(a):
 
 @inlined
 def _take_step(part, t, many):
-    """Change p̂ and û of all contacts, and the twists of the island, by the share t of the computed step."""
+    """Change the scaled impulses p̂ and velocities û, and the twists of the island `part`, by a share t of the step."""
     for g in range(many.counts[NUM_BATCHES]):
         dp = second_order_cone.apply_inv_scaling(_scaling_of(g, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many))
         of.put_batch_vector(
@@ -274,7 +279,7 @@ def _take_step(part, t, many):
 
 @inlined
 def _write_solution(part, many):
-    """Write the impulses of the island's contacts, and the twists that they cause, from the batches."""
+    """Write the impulses in the batches to the contacts of the island `part`, and the twists that they cause."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):

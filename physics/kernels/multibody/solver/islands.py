@@ -27,7 +27,8 @@ def union_contacts(n, many):
 def _list_contacts(n, many):
     """Number the islands in the order of their first contacts, and list the n contacts; return the number of islands.
 
-    Writes `many.islands.contacts` and `first_contact`; the number of an island is stored in `of_body` at its root.
+    Writes `many.islands.contacts` and `first_contact`. The number of an island is stored in `of_body` at the root body
+    of the island in the union-find forest.
     """
     island, begin, parent, count = many.islands.of_body, many.islands.first_contact, many.islands.parent, 0
     for b in range(island.shape[0]):

@@ -22,9 +22,9 @@ from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
 
-# Gains that a position correction may give without payment: a share of the body's rotational energy, and a lift, in
-# slops. Only bodies in islands that a wall pushes pay for a lift; elsewhere bodies push each other apart and keep their
-# momentum.
+# Largest gains of energy that a position correction does not take from the motion: as a share of the body's rotational
+# energy, and as a lift in slops. A larger lift is paid for only in islands that a wall pushes; elsewhere bodies push
+# each other apart and keep their momentum.
 _FREE_ROTATION_SHARE = 1.0e-7
 _FREE_LIFT_SLOPS = 10.0
 
@@ -140,7 +140,7 @@ def take_kinetic_energy(b, price, offset_frame, many):
 
 @inlined
 def free_lift_work(b, many):
-    """Work of a lift of body b by a few slops [J]; position corrections may do so much without payment."""
+    """Work of lifting body b by a few slops [J]; position corrections take no energy for less work than that."""
     body = many.bodies.body[b]
     return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 

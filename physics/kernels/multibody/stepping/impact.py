@@ -79,9 +79,9 @@ def rest_speed_limit(k, h, many):
 def impact_speed_limit(k, h, many):
     """Least approach speed of contact k for which a stage must end at the time of impact [m/s].
 
-    It closes `_FAST_RADIUS_SHARE` of the smaller body's radius within h [s]. Under error control (`adaptive_substep`)
-    every speed above `rest_speed_limit` is met in time. Else parts would be as short as the error in the place of the
-    impact.
+    This speed closes `_FAST_RADIUS_SHARE` of the smaller body's radius within h [s]. Under error control
+    (`adaptive_substep`) the result is at most `rest_speed_limit`. Otherwise a slow impact would be approached by ever
+    shorter parts, down to the allowed error.
     """
     one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     radius = many.bodies.body[one].radius
@@ -161,9 +161,9 @@ def _distant_target(k, h, is_last, many):
 def _is_in_same_moment(k, many):
     """True if open contact k has a gap so small that it belongs to an impact of other contacts.
 
-    That is a gap within two slops. If the pair touches elsewhere, it also is a gap within the tolerance times the way
-    of the contact in the substep, or times some radii. Else the corners of one face would hit one after another, and
-    each would turn the body that the next one turns back.
+    That is a gap of at most two slops. If the pair touches elsewhere, it also is a gap of at most the tolerance times a
+    length: the way that the contact closes in the substep, or ten radii of the smaller body. Else the corners of one
+    face would hit one after another, and each would turn the body that the next one turns back.
     """
     a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
     if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):
@@ -182,9 +182,9 @@ def set_impact_targets(n, h, is_last, many):
     They follow `contact_law.target_velocity.set_impact_targets`. h is the time left of the substep [s]; `is_last` says
     that the substep must not be cut again.
 
-    An approaching contact is left to the resting stage, unless it is fast, in two cases. Its speed is at most the one
-    that loads give within `rest_share` of the substep. Or it would close only a few slops until the middle of the
-    stage.
+    An approaching contact is left to the resting stage, unless it is faster than `impact_speed_limit`, in two cases.
+    Its speed is at most the one that loads give within `rest_share` of the substep. Or it would close only a few slops
+    until the middle of the stage.
     """
     fastest, is_impact = -1, False
     for k in range(n):
@@ -217,7 +217,10 @@ def _extend_impact(n, h, fastest, many):
 
 @inlined
 def drop_unconstrained(n, many):
-    """Drop the unconstrained contacts from the set, since they do not close in this stage; return the new number."""
+    """Remove the unconstrained contacts from the set of n contacts; return how many are left.
+
+    An unconstrained contact has the target -`_UNCONSTRAINED`. It does not close in this stage.
+    """
     left = 0
     for k in range(n):
         if many.contacts.target[k, 0] > -_UNCONSTRAINED:
@@ -236,10 +239,10 @@ def _mark_bodies(k, many):
 
 @inlined
 def constrain_coupled_contacts(n, many):
-    """Mark unconstrained contacts as `FORETOLD`, so that they stay in the set, if their bodies are in other contacts.
+    """Keep unconstrained contacts in the set, by the target `FORETOLD`, if pushes on their bodies may close them.
 
-    The other contacts must be in the set or have been marked here. Loads alone do not close a marked contact in this
-    stage, but pushes on its bodies may.
+    Loads alone do not close an unconstrained contact in this stage. Pushes may, if one of its bodies is in another
+    contact of the set, or in a contact that was kept for this reason. n is the number of contacts.
     """
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
@@ -265,7 +268,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
     The time [s] is a lower bound of that until the next impact (`time_to_first_impact`). n is the number of contacts in
     the set at first. The impact happens t [s] after the start of the call, with h [s] left of the substep. `is_last`
     says that the substep must not be cut again. With sequential impacts only the fastest contact gives an impulse; the
-    step returns for the others.
+    substep then looks for further impacts.
     """
     fastest = set_impact_targets(n, h, is_last, many)
     meeting = time_to_first_impact(n, h, is_last, many)

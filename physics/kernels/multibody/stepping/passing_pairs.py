@@ -234,8 +234,9 @@ def _fastest_stopping(first, last, h, many):
 def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
     """Mark of the pair whose fastest contact is k: `_PASSING`, `_MEETING`, or 0 for neither.
 
-    A pair is passing if a plane parts its bodies when they are thinned by the slop alone, and meeting if none does even
-    when they are thinned by `_thinning`. n is the number of contacts in the set, h the length of the stage [s].
+    A pair is meeting if no plane parts its bodies even when they are thinned by `_thinning`. It is passing if a plane
+    parts them when they are thinned by the slop alone, and the plane is not across the normal of contact k. n is the
+    number of contacts in the set, h the length of the stage [s].
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     slop, thinnest = pair_slop(a, b, many), _thinning(a, b, n, h, many)
@@ -271,9 +272,9 @@ def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
 def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     """Replace the contacts of a passing pair by one contact in row `to` of the set: (whether it passes, next row).
 
-    k is the pair's fastest contact, of n in the set. The contacts stay if the plane between the bodies is across the
-    normal of contact k. They also stay if the bodies touch along that plane, unless contact k is deeper than their
-    thinning allows along any direction. Passing bodies that nothing else can push get no contact.
+    k is the pair's fastest contact, of n in the set. The old contacts stay in two cases. The direction that parts the
+    bodies may be the normal of contact k already. Or the bodies touch along that direction, unless contact k is deeper
+    than their thinning allows along any direction. Passing bodies that nothing else can push get no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     mark, thinner = many.contacts.target[k, 0], _thinning(a, b, n, h, many)

@@ -37,7 +37,7 @@ _CORRECTION_SHARE = 0.5
 _MAX_ROUNDS = 30
 _DEEP_SLOPS = 100.0
 
-# Share of their rotational energy that bodies without relative motion may gain without payment.
+# Largest gain of two bodies without relative motion that is not taken from them, as a share of their rotational energy.
 _FREE_SPIN_SHARE = 1.0e-6
 
 # Largest error of the displacements, relative to the largest target or to so many slops, whichever is larger; if solves

@@ -1,7 +1,7 @@
 """Displacements that push bodies apart: sweeps along the contact normals over contacts that overlap.
 
-Most contacts of a set have no target above 0, and their bodies are never pushed. So the row of a contact is assembled
-at its first visit. After a sweep that pushes no new body, only contacts of pushed bodies are visited.
+Most contacts of a set have no target displacement above 0, and their bodies are never pushed. So the row of a contact
+is assembled at its first visit. After a sweep that pushes no new body, only contacts of pushed bodies are visited.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ OVERLAP_SHARE = 1.0e-2
 
 @inlined
 def record_penetration(n, world, memory, report, many):
-    """Record the deepest penetration of the n contacts, and the contacts without room, in the world's report.
+    """Record the deepest penetration of the n contacts, and the contacts that found no room, in the world's report.
 
     If `memory` is empty, a user has just placed the bodies: then overlap of two bodies is reported, too.
     """
