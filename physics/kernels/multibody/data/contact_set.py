@@ -145,7 +145,7 @@ def arrival_gap(a, b, many):
 
 @inlined
 def _may_turn_far(a, b, many):
-    """True if body a, or body b unless b < 0, may turn far in this stage (`stepping.conservative_advancement`)."""
+    """True if body a or body b may turn far in this stage (`stepping.conservative_advancement`); b < 0 is a wall."""
     return many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)
 
 

@@ -97,10 +97,11 @@ def _point_above_face(r, x, y, s, t, many):
 
 @inlined
 def _add_face_contacts(a, b, face, source, count, least, h, many):
-    """Add the contacts between `face` and the clipped face of the other block in copy `source`, of `count` vertices.
+    """Add the contacts between `face` and the clipped face of the other block, given as a polygon.
 
-    The clipped face is lifted along the normal until no contact has a gap below `least` [m]. Of blocks that touch with
-    two parallel edges, only the ends of the common edge are added. h is the length of the stage [s].
+    The polygon has `count` vertices in copy `source` of `many.narrowphase.polygon`. It is lifted along the normal until
+    no contact has a gap below `least` [m]. If the blocks touch with two parallel edges, only the ends of the common
+    edge are added. h is the length of the stage [s].
     """
     r, o, axis, sign = _reference_face(a, b, face, many)
     d = many.bodies.body[r].dims

@@ -31,7 +31,7 @@ def _crossing(p, q, axis, bound):
 
 @inlined
 def is_polygon_inside(source, count, axis, sign, bound, many):
-    """True if sign * coordinate `axis` <= bound for all `count` vertices of the polygon in copy `source`."""
+    """True if sign * coordinate `axis` <= bound for the first `count` vertices of `many.narrowphase.polygon[source]`."""
     furthest = -math.inf
     for k in range(count):
         furthest = max(furthest, sign * many.narrowphase.polygon[source, k, axis])
@@ -40,12 +40,12 @@ def is_polygon_inside(source, count, axis, sign, bound, many):
 
 @inlined
 def clip_polygon(source, count, axis, sign, bound, side, slop, many):
-    """Clip the polygon of `count` vertices in copy `source` into the other copy; return the new number of vertices.
+    """Clip a polygon by sign * coordinate `axis` <= bound; return the new number of vertices.
 
-    Vertices with sign * coordinate `axis` <= bound stay; `side` is the number of the clipping edge. A vertex outside by
-    at most the slop [m] stays, too, since it would otherwise come and go by rounding where two faces end together. It
-    takes the place of the crossing of its edge with the bound, which may be far away if the edge is nearly parallel to
-    it.
+    The polygon has `count` vertices in copy `source` of `many.narrowphase.polygon`; the result is written to the other
+    copy. `side` is the number of the clipping edge. A vertex outside by at most the slop [m] stays, too, since it would
+    otherwise come and go by rounding where two faces end together. It takes the place of the crossing of its edge with
+    the bound, which may be far away if the edge is nearly parallel to it.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0
@@ -69,10 +69,11 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
 
 @inlined
 def write_incident_face(r, o, axis, sign, many):
-    """Write the incident face of block o into copy 0 of the polygon: the face most opposed to a face of block r.
+    """Write the incident face of block o, the one most opposed to a face of block r, as a polygon.
 
-    The face of r has the outward normal sign * body axis `axis`. Coordinates of the vertices are along the next two
-    body axes of r, heights along the outward normal above the centre of r [m].
+    The polygon is copy 0 of `many.narrowphase.polygon`. The face of r has the outward normal sign * body axis `axis`.
+    Coordinates of the vertices are along the next two body axes of r; heights are along the outward normal, above the
+    centre of r [m].
     """
     R, d, p = many.bodies.rotation, many.bodies.body[o].dims, many.narrowphase.polygon
     out = body_axis(R, r, axis)
@@ -105,10 +106,10 @@ def clamp_to_half_width(s, bound):
 
 @inlined
 def keep_deepest_vertex(x, y, many):
-    """Reduce copy 0 of the polygon to its lowest vertex, moved over the reference face; return the copy, 0.
+    """Reduce the polygon in copy 0 of `many.narrowphase.polygon` to its lowest vertex; return the copy, 0.
 
-    x and y are the half edges of the reference face [m]. This serves blocks that are also apart sideways: the plane of
-    the face still separates them.
+    The vertex is moved over the reference face, which has the half edges x and y [m]. This serves blocks that are also
+    apart sideways: the plane of the face still separates them.
     """
     p, edge, low = many.narrowphase.polygon, many.narrowphase.edge, 0
     for k in range(4):
@@ -125,7 +126,7 @@ def keep_deepest_vertex(x, y, many):
 
 @inlined
 def min_vertex_height(source, count, polygon):
-    """Least height of the `count` vertices of the polygon in copy `source` [m]."""
+    """Least height of the first `count` vertices of `polygon[source]` [m]."""
     low = math.inf
     for k in range(count):
         low = min(low, polygon[source, k, 2])

@@ -39,11 +39,12 @@ def _side_plane(which, ring, k, first, last, out, hulls):
 
 @inlined
 def _clip_polygon(source, count, m, bound, side, slop, hulls):
-    """Clip the polygon of `count` vertices in copy `source` by m·x <= bound: (copy of the result, its vertices).
+    """Clip a polygon by m·x <= bound, for a unit vector m: (copy of the result, its number of vertices).
 
-    m is a unit vector, `side` the number of the clipping edge. A vertex outside by at most the slop [m] stays, too,
-    since it would otherwise come and go by rounding where two faces end together. It takes the place of the crossing of
-    its edge with the bound, which may be far away if the edge is nearly parallel to it.
+    The polygon has `count` vertices in copy `source` of `hulls.polygon`. `side` is the number of the clipping edge. A
+    vertex outside by at most the slop [m] stays, too, since it would otherwise come and go by rounding where two faces
+    end together. It takes the place of the crossing of its edge with the bound, which may be far away if the edge is
+    nearly parallel to it.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
@@ -79,10 +80,11 @@ def _has_corner(f, corner, hulls):
 
 @inlined
 def write_hull_incident_face(which, o, out, many):
-    """Write the incident face of body o, number `which` of the pair, into copy 0; return its number of vertices.
+    """Write the incident face of body o, number `which` of the pair, as a polygon; return its number of vertices.
 
-    It is a face at the corner of o that is farthest against the direction `out`. Among the faces there it is the one
-    whose normal is most opposed to `out`. The most opposed of all faces of o need not have that corner.
+    The polygon is copy 0 of `hulls.polygon`. The face is at the corner of o that is farthest against the direction
+    `out`. Among the faces there it is the one whose normal is most opposed to `out`. The most opposed of all faces of o
+    need not have that corner.
     """
     hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):

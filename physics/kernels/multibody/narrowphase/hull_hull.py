@@ -131,7 +131,7 @@ def _edge_normal(a, b, i, j, many):
 
 @inlined
 def _keep_deepest_vertex(which, r, o, face, many):
-    """Reduce copy 0 of the polygon to the lowest vertex of the incident face: (copy 0, 1 vertex).
+    """Reduce the polygon in copy 0 of `hulls.polygon` to the lowest vertex of the incident face: (copy 0, 1 vertex).
 
     Body r, number `which` of the pair, has the reference face `face`; body o has the incident face. The vertex is moved
     over the reference face. This serves bodies that are also apart sideways: the plane of the face still separates
@@ -152,7 +152,7 @@ def _keep_deepest_vertex(which, r, o, face, many):
 
 @inlined
 def _clipped_height(which, face, source, count, many):
-    """Height of the lowest of `count` vertices in copy `source` of the polygon above a face [m]; inf if there is none.
+    """Height of the lowest of `count` vertices of `hulls.polygon[source]` above a face [m]; inf if there is none.
 
     `face` belongs to body `which` of the pair.
     """
@@ -164,10 +164,11 @@ def _clipped_height(which, face, source, count, many):
 
 @inlined
 def _add_face_contacts(a, b, which, face, source, count, least, h, many):
-    """Add the contacts between `face` and the clipped face of the other body in copy `source`, of `count` vertices.
+    """Add the contacts between `face` and the clipped face of the other body, given as a polygon.
 
-    `face` belongs to body `which` of the pair (0: a, 1: b). The clipped face is lifted along the normal until no
-    contact has a gap below `least` [m]. h is the length of the stage [s].
+    `face` belongs to body `which` of the pair (0: a, 1: b). The polygon has `count` vertices in copy `source` of
+    `hulls.polygon`. It is lifted along the normal until no contact has a gap below `least` [m]. h is the length of the
+    stage [s].
     """
     hulls, origin = many.narrowphase.hulls, row_vector(many.bodies.center, a, 0)
     out, offset = row_vector(hulls.normal[which], face, 0), hulls.offset[which, face]

@@ -106,7 +106,8 @@ def _set_starting_point(start, many):
 def _add_batch_matrix(g, s, w, x, y, many):
     """Add Jᵀ S W⁻² (S + e dᵀ) J of the contacts of batch g to the linear system.
 
-    s is the diagonal of S, w = (w₀, w₁, w₂, η) the scaling W, and d = (0, x, y) the direction of slip.
+    S, W and e are those of the module. s is the diagonal of S, w = (w₀, w₁, w₂, η) the scaling W, and d = (0, x, y) the
+    direction of slip, times the share that is included.
     """
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
@@ -176,7 +177,8 @@ def _scaling_of(g, many):
 def _batch_twist_step(g, s, many):
     """Vectors (S + e dᵀ) J dx of the contacts of batch g, for the change dx of twists in `many.newton.change`.
 
-    s is the diagonal of S; d = (0, x, y) is the direction of slip, times the share that is included.
+    S and e are those of the module, s is the diagonal of S, and d = (0, x, y) is the direction of slip, times the share
+    that is included.
     """
     x, y = of.batch_field(g, of.IPM_SLIP_DIRECTION, many), of.batch_field(g, of.IPM_SLIP_DIRECTION + 1, many)
     d = _apply_units(s, of.batch_velocity(g, many.newton.change, ANGULAR_OFFSET, many))
@@ -185,12 +187,14 @@ def _batch_twist_step(g, s, many):
 
 @inlined
 def _find_step_length(part, is_corrected, many):
-    """Compute the changes dp̂ and dû for the change of twists in `many.newton.change`: (step, product).
+    """Compute the changes dp̂ and dû that belong to the change of twists in `many.newton.change`: (step, product).
 
     p̂ and û are the scaled impulse and velocity of a contact (see the module). The step, at most 1, is the largest that
-    stays inside all cones. The product is the mean p̂·û of a contact after that step. The changes satisfy W dp̂ + W⁻¹
-    dû = f - λ, where f is the corrector (`IPM_CORRECTION`) if `is_corrected`, else 0. The product is right only for f =
-    0.
+    stays inside all cones. The product is the mean p̂·û of a contact after that step. The changes satisfy
+
+        W dp̂ + W⁻¹ dû = f - λ,
+
+    where f is the corrector (`IPM_CORRECTION`) if `is_corrected`, else 0. The product is right only without corrector.
     """
     most = Lanes(1.0, 1.0, 1.0, 1.0)  # lower bounds of 1/t, a lane each
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)
@@ -231,10 +235,13 @@ def _set_right_side(part, many):
 
 @inlined
 def _set_corrector(part, center, many):
-    """Write the right side of the corrector step to `many.newton.change`, with σ ν = `center`.
+    """Write the right side of the corrector step to `many.newton.change`; `center` is the target product σ ν.
 
-    The corrector f of each contact solves λ ∘ f = σ ν e - (W dp̂) ∘ (W⁻¹ dû), with the changes of the predictor step.
-    It is stored in the batches.
+    The corrector f of each contact solves
+
+        λ ∘ f = σ ν e - (W dp̂) ∘ (W⁻¹ dû),
+
+    with the changes dp̂ and dû of the predictor step (see the module). It is stored in the batches.
     """
     _set_right_side(part, many)
     for g in range(many.counts[NUM_BATCHES]):

@@ -44,11 +44,12 @@ def subtract_twists(b, a, c, many):
 
 @kernel
 def compute_defect(part, rho, all_hold, many):
-    """Write the defect x - M⁻¹ Jᵀ p(x) of an island's bodies into `many.newton.defect`, and p(x) into the batches.
+    """Compute the defect x - M⁻¹ Jᵀ p(x) of an island: (its norm weighted by mass, its largest velocity [m/s]).
 
-    Returns the defect's norm weighted by mass, and its largest velocity [m/s]. `part` is as in `newton_contacts`, `rho`
-    the penalty ρ [kg]. p(x) is q - ρ u, for impulses q and velocity errors u, projected on the friction cones. With
-    `all_hold` it is not projected: every contact sticks.
+    x is the change of the twists by the impulses: `bodies.twist` minus `bodies.free_twist`. p(x) is q - ρ u, for the
+    impulses q in the batches and velocity errors u, projected on the friction cones. With `all_hold` it is not
+    projected: every contact sticks. The defect is written to `many.newton.defect`, p(x) to the batches. `part` is as in
+    `newton_contacts`, `rho` the penalty ρ [kg].
     """
     _, _, begin, end = part
     for i in range(begin, end):

@@ -68,7 +68,7 @@ def apply_inv_scaling_twice(w, x):
 
 @inlined
 def jordan_product(a, b):
-    """Jordan product a ∘ b of two vectors."""
+    """Jordan product a ∘ b = (a·b, a₀ b' + b₀ a') of two vectors, with a' = (a₁, a₂)."""
     return (qt.dot(a, b), a[0] * b[1] + b[0] * a[1], a[0] * b[2] + b[0] * a[2])
 
 

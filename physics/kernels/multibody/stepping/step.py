@@ -1,8 +1,8 @@
-"""Step of worlds whose bodies touch each other: substeps, each a visible list of stages (`substep`).
+"""Step of worlds whose bodies touch each other: substeps, each of them a list of stages (`substep`).
 
-If the plan gives an error tolerance instead of a number of substeps, each substep is cut into parts that meet it
-(`adaptive_substep`). If the scene declares sleep, groups of bodies that have been at rest for long enough fall asleep
-(`data.sleeping`). Sleeping bodies only take part in the broad phase, until something wakes them.
+If the plan gives an error tolerance instead of a number of substeps, each substep is cut into parts that meet the
+tolerance (`adaptive_substep`). If the scene declares sleep, groups of bodies that have been at rest for long enough
+fall asleep (`data.sleeping`). Sleeping bodies only take part in the broad phase, until something wakes them.
 """
 
 from __future__ import annotations
