@@ -31,7 +31,7 @@ def _crossing(p, q, axis, bound):
 
 @inlined
 def is_polygon_inside(source, count, axis, sign, bound, many):
-    """True if sign * coordinate `axis` <= bound for the first `count` vertices of `many.narrowphase.polygon[source]`."""
+    """True if sign * coordinate `axis` <= bound for all `count` vertices of `many.narrowphase.polygon[source]`."""
     furthest = -math.inf
     for k in range(count):
         furthest = max(furthest, sign * many.narrowphase.polygon[source, k, axis])

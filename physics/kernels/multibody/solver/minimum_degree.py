@@ -107,9 +107,9 @@ def _write_column(b, at, many):
 
 @inlined
 def _eliminate_body(start, end, b, many):
-    """Eliminate body b: its remaining neighbours lose it, and become neighbours of each other.
+    """Eliminate body b: its remaining neighbours become neighbours of each other, and their degrees no longer count b.
 
-    They are `many.system.column[start:end]`. Returns False if there was no room for the new neighbours.
+    The remaining neighbours are `many.system.column[start:end]`. Returns False if there was no room for the new ones.
     """
     for i in range(start, end):
         a = many.system.column[i]

@@ -236,9 +236,10 @@ def is_every_contact_pushing(part, many):
 def try_all_sticking(part, friction, residual, enough, many):
     """Try impulses with every contact sticking, and keep them if the residual falls; return the residual [m/s].
 
-    It stops at a residual of at most `enough` [m/s]. If all contacts stick, p(x) is linear. So the matrix is factored
-    once, and a few rounds cost little more than one. A resting stack is solved so far below the tolerance that the next
-    steps find nothing to do. `part` and `friction` are as in `newton_contacts`; `residual` is that of the start.
+    It stops at a residual of at most `enough` [m/s]. If all contacts stick, the impulses p(x) of the module are linear
+    in x. So the matrix is factored once, and a few rounds cost little more than one. A resting stack is solved so far
+    below the tolerance that the next steps find nothing to do. `part` and `friction` are as in `newton_contacts`;
+    `residual` is that of the start.
     """
     first, last, begin, end = part
     rho = _STICK_RHO * _heaviest(part, many)

@@ -53,7 +53,7 @@ from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
 def drift_body(b, h, gyroscopic, offset_frame, many):
     """Move body b by a drift over h [s]: position and attitude change, momenta stay.
 
-    `gyroscopic` and `offset_frame` are those of `state.groups.FlightSwitches`.
+    `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`.
     """
     x, q, v, L = read_state(many.bodies.state, b)
     write_state(
@@ -133,9 +133,9 @@ def set_resting_targets(n, h, many):
 
 @inlined
 def hold_all_loads(h, gyroscopic, offset_frame, many):
-    """Hold the loads of the middle of a stage of length h [s] for every body; does nothing without force fields.
+    """Evaluate the loads at the middle of a stage of length h [s], and hold them over the stage, for every body.
 
-    `gyroscopic` and `offset_frame` are those of `state.groups.FlightSwitches`.
+    Without force fields it does nothing. `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`.
     """
     if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
         return
@@ -179,7 +179,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     """Do the work of `midpoint_step` after the loads are held: flights, drifts, contact problem, and its energy check.
 
     If the impulses raise the energy, the contact problem is solved again with targets that cannot, and then, if need
-    be, without friction.
+    be, without friction. Arguments are those of `midpoint_step`.
     """
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
