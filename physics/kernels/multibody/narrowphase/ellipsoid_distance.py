@@ -6,8 +6,8 @@ bodies are apart by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their dist
 way that moves them apart. The gradient g of σ is the vector from the point of b with normal n to the point of a with
 normal -n. At the maximum it is along n.
 
-An ellipsoid has s = √(nᵀDn) with D = R diag(a²) Rᵀ. Its point with normal n is p = Dn/s, and the second derivative of s
-is H = (D - p pᵀ)/s. So one Newton step δ on the sphere of directions satisfies
+An ellipsoid with semi-axes rᵢ and rotation matrix R has s = √(nᵀDn) with D = R diag(rᵢ²) Rᵀ. Its point with normal n is
+p = Dn/s, and the second derivative of s is H = (D - p pᵀ)/s. So one Newton step δ on the sphere of directions satisfies
 
     (H_a + H_b + σ) δ = g - (g·n) n,        δ ⟂ n, for H n = 0.
 

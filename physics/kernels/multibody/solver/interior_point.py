@@ -122,8 +122,8 @@ def _add_batch_matrix(g, s, w, x, y, many):
 def _scale_batch(g, share, many):
     """Compute the scaling of batch g, and add its matrix and right side to the system: (p̂·û, residual [m/s]).
 
-    Both results have a number for each contact; p̂ and û are its scaled impulse and velocity (see the module). `share`
-    is the share of the slip direction d that the matrix includes.
+    p̂ and û are the scaled impulse and velocity of a contact (see the module); both results have a number for each
+    contact. `share` is the share of the slip direction d that the matrix includes.
     """
     s, p, u = _units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many), of.batch_vector(g, of.IPM_VELOCITY, many)
     v = of.batch_velocity_error(g, many)

@@ -1,8 +1,8 @@
 """Safe times of free flight for bodies that turn far in a stage, near walls and each other.
 
 The same method as `physics.kernels.half_space.conservative_advancement`, for pairs of bodies a and b. Let x be their
-geometric centres, v their velocities, ω their angular velocities, s their support functions, and A a bound of the
-acceleration of their points. For a direction n out of b, the gap after a time t is at least
+geometric centres, v the velocities of these centres, ω the angular velocities, s the support functions, and A a bound
+of the acceleration of a body's points. For a direction n out of b, the gap after a time t is at least
 
     n·(x_a - x_b) + t n·(v_a - v_b) - s_a(-k_a) - s_b(k_b) - (A_a + A_b) t²/2,    k = n + t (n x ω),
 
