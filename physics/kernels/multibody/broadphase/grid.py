@@ -1,8 +1,9 @@
-"""Columns for the broad phase: bodies far apart across the sweep's axis are never compared.
+"""Grid columns of the broad phase: bodies far apart across the sweep's axis are never compared.
 
-The two world axes across that of the sweep are cut into strips about two mean boxes wide; a body is listed in every
-column that its box enters, in the sweep's order. A body that is large enters many; where all lists together would be
-long the strips are made wider, up to one column with everything in it, which is the sweep alone.
+The two world axes across the sweep's axis, u and v, are cut into strips about two mean box widths wide. A grid column
+is a strip of u crossed with a strip of v. A body is listed in every column that its box enters, in the order of the
+sweep. Large bodies enter many columns. If all lists together exceed their room, the strips are made wider, down to a
+single column that holds every body.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.multibody.data.arrays import ENTRIES_PER_BODY
 
-# Width of a strip in mean widths of a box: a box then enters about (1 + 1/2)² columns.
+# Width of a strip, in mean widths of the boxes: a box then enters about (1 + 1/2)² columns.
 BOXES_PER_STRIP = 2.0
 
 
 @inlined
 def _cut(k, many):
-    """Cut axis k into strips: (lowest coordinate, strips per metre, strips)."""
+    """Cut world axis k into strips over the extent of all boxes.
+
+    Returns (lowest coordinate [m], strips per metre, number of strips).
+    """
     box, count = many.bodies.box, many.bodies.box.shape[0]
     low, high, total = box[0, k], box[0, k + 3], 0.0
     for b in range(count):
@@ -26,7 +30,7 @@ def _cut(k, many):
         total += box[b, k + 3] - box[b, k]
     width = BOXES_PER_STRIP * total / count
     most = math.sqrt(float(count))
-    if not high - low >= width or not width > 0.0:  # also what is not finite
+    if not high - low >= width or not width > 0.0:  # also if a coordinate is not finite
         return low, 0.0, 1
     strips = int(min((high - low) / width, most))
     return low, strips / (high - low), strips
@@ -34,13 +38,16 @@ def _cut(k, many):
 
 @inlined
 def strip_index(x, low, density, strips):
-    """Index of the strip that contains coordinate x."""
+    """Index of the strip that contains coordinate x [m], from `low`, `density` and `strips` as `_cut` returns them."""
     return min(max(int((x - low) * density), 0), strips - 1)
 
 
 @inlined
 def body_strips(b, u, v, cuts, many):
-    """First and last strips of body b along both axes: (u from, u to, v from, v to)."""
+    """Strips that the box of body b covers along axes u and v: (first of u, last of u, first of v, last of v).
+
+    `cuts` are the results of `_cut` for u and v, in one tuple.
+    """
     box = many.bodies.box
     lu, du, nu, lv, dv, nv = cuts
     return (
@@ -51,7 +58,10 @@ def body_strips(b, u, v, cuts, many):
 
 @inlined
 def _count_entries(u, v, cuts, many):
-    """Count the bodies that enter column c into `many.broadphase.first_entry[c + 1]`; return the number of entries."""
+    """Count the bodies in each grid column c, in `many.broadphase.first_entry[c + 1]`; return the sum of the counts.
+
+    For u, v and `cuts` see `body_strips`.
+    """
     first, total = many.broadphase.first_entry, 0
     for c in range(cuts[2] * cuts[5] + 1):
         first[c] = 0
@@ -66,10 +76,11 @@ def _count_entries(u, v, cuts, many):
 
 @kernel
 def fill_columns(u, v, many):
-    """List the bodies, in the order of `many.broadphase.order`, in the columns along axes u and v; return the cuts.
+    """List all bodies in the columns that their boxes enter; return the cuts of axes u and v (see `body_strips`).
 
-    Column c = strip of u * strips of v + strip of v has `many.broadphase.entry[first_entry[c] : first_entry[c + 1]]`;
-    `many.broadphase.cursor[c]` is where it begins.
+    Column c = i * strips of v + j, for strip i of u and strip j of v, has the bodies
+    `many.broadphase.entry[first_entry[c] : first_entry[c + 1]]`, in the order of `many.broadphase.order`.
+    `many.broadphase.cursor[c]` is set to the column's first position.
     """
     lu, du, nu = _cut(u, many)
     lv, dv, nv = _cut(v, many)

@@ -1,9 +1,9 @@
-"""Broad phase: find the bodies that may touch within a stage.
+"""Broad phase: find the pairs of bodies that may touch within a stage.
 
-Sweep and prune: the boxes around the bodies, the motion of the stage included, are sorted along the world axis on
-which the bodies are spread most; a body is then compared with those behind it until one begins beyond its end. Many
-bodies are compared within columns along that axis only (`grid`). The pairs come in the order of the bodies, so
-that what two of them do does not depend on where others are.
+Sweep and prune: every body has a swept box, which contains its motion in the stage. The boxes are sorted along the
+world axis along which the bodies' centres vary most. A body is then compared with later ones until a box begins beyond
+the end of its own. Only bodies in the same grid column across that axis are compared (`grid`). Pairs are returned in
+the order of their bodies' indices, so that results for two bodies do not depend on the places of others.
 
 Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
 """
@@ -19,23 +19,24 @@ from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
-# By how much more than at its first pace a body that turns far may do so; see `surface_motion_bound`.
+# Bound of the factor by which growing spin moves points farther than the initial spin would (`surface_motion_bound`).
 _SPIN_GROWTH = 1.5
 
 
 @inlined
 def center_motion_bound(b, h, many):
-    """Bound of the displacement of body b's centre of mass, and of its bounding sphere, in h without contact [m]."""
+    """Bound of the displacement of body b's centre of mass within h [s] without contact [m]."""
     t = many.bodies.twist
     return h * (abs(t[b, 0]) + abs(t[b, 1]) + abs(t[b, 2])) + 0.5 * h * h * many.bodies.body[b].acceleration
 
 
 @inlined
 def surface_motion_bound(b, h, many):
-    """Bound of the displacement of any point of body b in h without contact [m]; a turn adds at most its diameter.
+    """Bound of the displacement of any point of body b within h [s] without contact [m].
 
-    The angular velocity of a body that turns far may grow meanwhile. As |dω/dt| <= |ω|²/√3, a turn of θ at the initial
-    rate becomes at most -√3 log(1 - θ/√3). Its chord is at most 1.5 θ, or 2 radii.
+    Rotation adds at most two bounding radii. The angular velocity ω of a body that turns far may grow meanwhile. Its
+    derivative is at most ω²/√3 in size, so that a turn of θ at the initial rate becomes at most -√3 log(1 - θ/√3). The
+    chord of that turn is at most 1.5 θ, or 2, in bounding radii.
     """
     t = many.bodies.twist
     turn = h * (abs(t[b, 3]) + abs(t[b, 4]) + abs(t[b, 5]))
@@ -46,7 +47,10 @@ def surface_motion_bound(b, h, many):
 
 @inlined
 def may_reach_wall(b, wall, h, many):
-    """True if body b may touch a wall within h, by its bounding sphere; a body that turns fast far away may not."""
+    """True if the bounding sphere of body b may touch a wall within h [s]; `wall` is the wall's index.
+
+    Rotation does not move the sphere, so that a body that spins fast far from the wall does not count.
+    """
     d = (
         qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.state, b, POS))
         - many.walls[wall, WALL_OFFSET]
@@ -56,7 +60,7 @@ def may_reach_wall(b, wall, h, many):
 
 @inlined
 def may_meet(a, b, h, many):
-    """True if the bounding spheres of two bodies may touch within h."""
+    """True if the bounding spheres of bodies a and b may touch within h [s]."""
     far = (
         many.bodies.body[a].radius
         + many.bodies.body[b].radius
@@ -70,7 +74,7 @@ def may_meet(a, b, h, many):
 
 @inlined
 def half_extent(b, axis, many):
-    """Half the width of body b along a world axis [m]; of a hull that of the block with its `dimensions`."""
+    """Half the width of body b along a world axis (0, 1 or 2) [m]; for a hull, half the width of its bounding block."""
     R, d, shape = many.bodies.rotation, many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return d[0]
@@ -82,7 +86,7 @@ def half_extent(b, axis, many):
 
 @kernel
 def write_swept_boxes(h, many):
-    """Write `many.box`: the region that every body may sweep in h, plus the slop."""
+    """Write `many.bodies.box`: for every body a box around all its possible places within h [s], plus the slop."""
     for b in range(many.bodies.state.shape[0]):
         margin = surface_motion_bound(b, h, many) + many.bodies.body[b].slop
         for axis in range(3):
@@ -93,7 +97,7 @@ def write_swept_boxes(h, many):
 
 @inlined
 def widest_axis(many):
-    """World axis with the largest variance of the bodies' centres."""
+    """World axis along which the bodies' geometric centres have the largest variance: 0, 1 or 2."""
     best, axis, count = -1.0, 0, many.bodies.center.shape[0]
     for k in range(3):
         total = square = 0.0
@@ -109,7 +113,10 @@ def widest_axis(many):
 
 @inlined
 def _merge(first, middle, last, axis, many):
-    """Merge two adjacent sorted runs of `many.broadphase.order`."""
+    """Merge the runs [first, middle) and [middle, last) of `many.broadphase.order` into one sorted run.
+
+    Bodies are sorted by the lower end of their boxes along a world axis.
+    """
     order, merged, box = many.broadphase.order, many.broadphase.merged, many.bodies.box
     i, j = first, middle
     for k in range(first, last):
@@ -125,7 +132,7 @@ def _merge(first, middle, last, axis, many):
 
 @inlined
 def sort_bodies(axis, many):
-    """Write `many.broadphase.order`: the bodies by the lower end of their boxes, ties by index (merge sort)."""
+    """Write `many.broadphase.order`: bodies sorted by the lower end of their boxes along an axis, ties by index."""
     count = many.broadphase.order.shape[0]
     for b in range(count):
         many.broadphase.order[b] = b
@@ -149,7 +156,12 @@ def _overlap(a, b, many):
 
 @inlined
 def _pair_in_column(a, i, j, axes, cuts, count, many):
-    """Add the pairs of a with later bodies in a column, if their boxes first overlap there; return the new count."""
+    """Add the near pairs of body a with later bodies of one grid column to `many.broadphase.pairs`.
+
+    The column is strip i of u and strip j of v, with axes = (sweep's axis, u, v). `cuts` are as in `grid.body_strips`.
+    A pair that shares several columns is added in the first of them only. `count` is the number of pairs so far;
+    returns the new number.
+    """
     axis, u, v = axes
     box, nv = many.bodies.box, cuts[5]
     column = i * nv + j
@@ -163,7 +175,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
         a_i, _, a_j, _ = body_strips(a, u, v, cuts, many)
         b_i, _, b_j, _ = body_strips(b, u, v, cuts, many)
         if max(a_i, b_i) != i or max(a_j, b_j) != j:
-            continue  # found in the column of the lower corner of what the boxes share
+            continue  # added in another column: that of the lower corner of the boxes' overlap
         if count == many.broadphase.pairs.shape[0]:
             many.counts[NUM_DROPPED] += 1
             continue
@@ -174,7 +186,10 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
 
 @inlined
 def _count_into(pairs, column, count, first, target):
-    """Copy `count` pairs to `target`, sorted by one of their bodies, equal ones in their old order (counting sort)."""
+    """Copy the first `count` rows of `pairs` to `target`, sorted by their entry in `column` (stable counting sort).
+
+    `first` (bodies + 1,) is scratch.
+    """
     for b in range(first.shape[0]):
         first[b] = 0
     for k in range(count):
@@ -189,7 +204,7 @@ def _count_into(pairs, column, count, first, target):
 
 @inlined
 def _is_sorted(pairs, count):
-    """True if the pairs come in the order of their first, then their second body."""
+    """True if the first `count` pairs are in the order of their first body, then of their second body."""
     for k in range(1, count):
         if pairs[k, 0] < pairs[k - 1, 0] or (pairs[k, 0] == pairs[k - 1, 0] and pairs[k, 1] < pairs[k - 1, 1]):
             return False
@@ -198,7 +213,7 @@ def _is_sorted(pairs, count):
 
 @kernel
 def _sort_pairs(count, many):
-    """Sort the pairs by their first, then their second body; places of other bodies do not change their order."""
+    """Sort the first `count` pairs of `many.broadphase.pairs` by their first body, then by their second body."""
     sweep = many.broadphase
     _count_into(sweep.pairs, 1, count, sweep.first_entry, sweep.sorted_pairs)
     _count_into(sweep.sorted_pairs, 0, count, sweep.first_entry, sweep.pairs)
@@ -206,7 +221,10 @@ def _sort_pairs(count, many):
 
 @kernel
 def find_pairs(h, many):
-    """Write `many.broadphase.pairs` and their number: all pairs (a < b) with overlapping boxes, in order."""
+    """Find all near pairs within h [s]: write `many.broadphase.pairs` and their number `many.counts[NUM_PAIRS]`.
+
+    A near pair is two bodies a < b whose swept boxes overlap. Pairs are sorted by a, then by b.
+    """
     write_swept_boxes(h, many)
     axis = widest_axis(many)
     sort_bodies(axis, many)

@@ -1,6 +1,6 @@
-"""Allocate the workspace of a world whose bodies touch each other: capacities, and one function for each group.
+"""Allocate the workspace of a world whose bodies touch each other: its capacities, and its groups of arrays.
 
-Capacities grow with the numbers of bodies, walls and contacts; what finds no room is counted in the report.
+Capacities grow with the numbers of bodies, walls and contacts. The report counts contacts and pairs without room.
 """
 
 from __future__ import annotations
@@ -41,44 +41,54 @@ from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
 
 def bodies_setting_fields() -> list[tuple]:
-    """Fields of the numerical settings, and of a stage's instructions to the solver."""
+    """Fields of the record `settings`: numerical settings, and instructions of the present stage to the solver.
+
+    Returns (name, type) tuples for `numpy.dtype`.
+    """
     f, i = np.float64, np.int64
     return [
         *setting_fields(),
-        ("residual_limit", f),  # allowed beside the tolerance [m/s]: see `time_stepping.midpoint_step.rest_residual`
-        ("half_load_speed", f),  # with error control: least speed that half a substep's loads give a body [m/s], else 0
-        ("substep", f),  # length of the substep, or of a part of it with error control [s]
+        ("residual_limit", f),  # largest residual, besides the tolerance [m/s]: `stepping.midpoint_step.rest_residual`
+        ("half_load_speed", f),  # error control: least speed that loads give a body in half a substep [m/s]; else 0
+        ("substep", f),  # length of the substep [s]; under error control of the present part of it
         ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
-        ("is_resting_stage", i),  # 1: contacts are held through a stage, 0: impacts
+        ("is_resting_stage", i),  # 1: solve of a resting stage without error control; 0: any other solve
         ("meet", i),  # 1: bodies touch each other, 0: walls only
-        ("is_sequential", i),  # 1: contacts that collide do so one after the other
+        ("is_sequential", i),  # 1: colliding contacts are resolved one after the other
         ("is_error_controlled", i),  # 1: steps have an error tolerance
     ]
 
 
 def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
-    """Largest number of contacts in a world of so many bodies and walls; `polyhedra` are those of `make_hulls`."""
+    """Largest number of contacts in a world with these numbers of bodies and walls.
+
+    `polyhedra` are the bodies as `make_hulls` takes them; empty if the world has no hulls.
+    """
     corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
     return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
 
 
 def pair_capacity(bodies: int) -> int:
-    """Largest number of near pairs in a world of so many bodies."""
+    """Number of near pairs that the workspace of a world with this number of bodies has room for."""
     return max(1, min(bodies * (bodies - 1) // 2, PAIRS_PER_BODY * bodies))
 
 
 def block_capacity(bodies: int) -> int:
-    """Largest number of off-diagonal blocks of the linear system in a world of so many bodies."""
+    """Number of off-diagonal blocks that the linear system of a world with this number of bodies has room for."""
     return min(max(1, bodies * (bodies - 1) // 2), BLOCKS_PER_BODY * bodies)
 
 
 def batch_capacity(bodies: int, contacts: int) -> int:
-    """Largest number of batches of contacts in a world of so many bodies and contacts."""
+    """Number of contact batches that there is room for, in a world with these numbers of bodies and contacts."""
     return max(1, min(contacts, BATCHES_PER_BODY * bodies))
 
 
 def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
-    """Number of columns of `memory` of one world; with refined substeps the last one is the length of a part."""
+    """Number of columns of a world's row of `memory`, the warm start (`arrays.WARM_CONTACT_ID`, ...).
+
+    `polyhedra` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps one number
+    more.
+    """
     return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
 
 
@@ -94,11 +104,28 @@ def make_bodies_workspace(
     relative_slop: float,
     **settings: float,
 ) -> BodiesWorkspace:
-    """Scratch for worlds of `bodies` bodies among `walls` ((walls, WALL_SIZE)), with fields and numerical settings.
+    """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
 
-    `polyhedra` are those of `make_hulls`, empty where there is no hull. `meet` says whether bodies touch each other, or
-    walls only; `is_sequential` whether contacts that collide do so one after the other; `is_error_controlled` whether
-    steps have an error tolerance.
+    Parameters
+    ----------
+    bodies : int
+        Number of bodies of a world.
+    walls : array (walls, WALL_SIZE)
+        Columns of `state.layout`; copied.
+    terms : tuple of Term
+        Force fields of the scene, which add fields to the record of a body.
+    polyhedra : sequence
+        The bodies as `make_hulls` takes them; empty if the world has no hulls.
+    meet : bool
+        True if bodies touch each other, False if they touch walls only.
+    is_sequential : bool
+        True if colliding contacts are resolved one after the other.
+    is_error_controlled : bool
+        True if steps have an error tolerance.
+    relative_slop : float
+        Gap within which features touch, in bounding radii.
+    settings : float
+        Further fields of `bodies_setting_fields`, by name.
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
@@ -252,7 +279,10 @@ def _make_settings(settings: dict[str, float]) -> np.ndarray:
 
 
 def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:
-    """Storage for a world of so many bodies and columns of `memory` at three moments."""
+    """Storage for copies of a world at three moments.
+
+    `bodies` is the number of its bodies, `memory` the number of columns of its row of `memory` (`warm_start_size`).
+    """
     return WorldSnapshots(
         np.zeros((3, bodies, STATE_SIZE)),
         np.zeros((3, memory)),

@@ -1,8 +1,8 @@
 """Scratch memory of one thread for worlds whose bodies touch each other.
 
-`BodiesWorkspace` is a named tuple of groups of arrays, one for each part of a step. Its type does not depend on the
-number of bodies, walls or contacts: one compiled kernel serves them all. It is filled anew for every world and every
-stage; nothing in it outlives a step.
+`BodiesWorkspace` is a named tuple of groups of arrays, one group for each part of a step. Kernels call it `many`. Its
+type does not depend on the number of bodies, walls or contacts, so that one compiled kernel serves all of them. The
+arrays are filled anew for every world and every stage; no value in them outlives a step.
 
 Shapes are given in these numbers:
 
@@ -16,8 +16,8 @@ batches   `batch_capacity`: batches of contacts that there is room for
 slots     a power of two, at least twice the contacts
 ========  ==============================================================
 
-Arrays are of float64; `int` in a shape says int64. Contacts and bodies are referred to by their indices, a wall k among
-bodies by -1 - k.
+Arrays are of float64; `int` in a shape means int64. Contacts and bodies are referred to by their indices. Where a body
+is expected, -1 - k stands for wall k.
 """
 
 from __future__ import annotations
@@ -28,45 +28,48 @@ import numpy as np
 
 from physics.kernels.multibody.data.hull_tables import Hulls
 
-# Columns of `many.bodies.momenta` in a resting stage: velocities before it, then momenta with its loads.
+# First columns of two groups of six in `many.bodies.momenta` during a resting stage: twist before the loads act;
+# velocity and angular momentum after the loads have acted.
 PRE_LOAD_VELOCITY, LOADED_MOMENTA = 0, 6
 
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
 PAIR_CONTACTS = 8
 
-# Pairs near each other at once, per body: twelve spheres touch one of their size, and each pair counts for two.
+# Room for near pairs, per body: at most twelve equal spheres touch one, and each pair belongs to two bodies.
 PAIRS_PER_BODY = 8
 
-# Entries of all columns of the broad phase, per body.
+# Room for entries in the grid columns of the broad phase, per body.
 ENTRIES_PER_BODY = 4
 
-# Blocks of the linear system of `block_lu` per body: where more are needed Newton's method is left out.
+# Room for off-diagonal blocks of the linear system of `block_lu`, per body. An island that needs more is solved without
+# Newton's method.
 BLOCKS_PER_BODY = 32
 
-# Batches of contacts of one island (`contact_batches`) per body: where more are needed Newton's method is left out,
-# too.
+# Room for batches of contacts (`contact_batches`), per body. An island that needs more is solved without Newton's
+# method.
 BATCHES_PER_BODY = 32
 
-# Entries of `counts`: contacts, pairs, contacts or pairs without room, and batches of the island that is solved.
+# Entries of `counts`: contacts; near pairs; contacts or pairs without room; batches of the island that is solved;
+# contacts of two bodies that would stop them (`contact_set.is_stopping`).
 NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES, NUM_STOPPING = range(5)
 
-# Of `block_lu`: numbers of a column, velocity and angular velocity with one unused after each, and of a block of six.
+# Sizes in `block_lu`: a column holds velocity and angular velocity, an unused number after each; a block has six
+# columns.
 COLUMN_SIZE = 8
 BLOCK_SIZE = 6 * COLUMN_SIZE
 
-# Numbers of a row of `normal_rows`: five vectors, one unused number after each; and of a row of `visit_rows`, five
-# cache lines.
+# Numbers in a row of `normal_rows` (five vectors, an unused number after each) and of `visit_rows` (five cache lines).
 NORMAL_ROW_SIZE = 5 * 4
 VISIT_SIZE = 5 * 8
 
-# Numbers of a row of `batch`, and of `lanes`: four for each of the fields in `contact_batches`.
+# Numbers in a row of `batch`, and in a row of `lanes`: four, one per contact, for each field of `contact_batches`.
 BATCH_SIZE = 6
 LANES_SIZE = 4 * 52
 
 # Row of `memory`, one per world: length of the last resting stage [s], its contact count, then `WARM_CONTACT_SIZE`
-# numbers for each contact: its id, first and second body (-1 - k: wall k), impulse and point in the world frame.
-# Where substeps are refined the last column of all is the next part of one as a share of it (`adaptive_substep`; 0: all
-# of it).
+# numbers for each contact: its id, first and second body (-1 - k: wall k), impulse [N s] and point [m], world frame.
+# Under error control the last column is the length of the next part of a substep, as a share of the substep
+# (`adaptive_substep`; 0: the whole substep).
 WARM_STAGE_LENGTH, WARM_CONTACT_COUNT = range(2)
 WARM_HEADER_SIZE = 2
 WARM_CONTACT_ID, WARM_BODY_A, WARM_BODY_B, WARM_IMPULSE, WARM_POINT = 0, 1, 2, 3, 6
@@ -74,50 +77,50 @@ WARM_CONTACT_SIZE = 9
 
 
 class WorldSnapshots(NamedTuple):
-    """States of a world to which `adaptive_substep` returns, one row for each."""
+    """Saved states of a world to which `adaptive_substep` returns; the first axis is the moment of the copy."""
 
     state: np.ndarray  # (moments, bodies, STATE_SIZE) states of the bodies
-    memory: np.ndarray  # (moments, columns) row of `memory`
-    report: np.ndarray  # (moments, REPORT_SIZE) row of the report
-    counts: np.ndarray  # (moments, bodies) int, events of each body
+    memory: np.ndarray  # (moments, columns) the world's row of `memory`
+    report: np.ndarray  # (moments, REPORT_SIZE) the world's row of the report
+    counts: np.ndarray  # (moments, bodies) int, number of events of each body
 
 
 class Bodies(NamedTuple):
-    """Bodies of the world: parameters, poses and motion."""
+    """Bodies of the world: parameters, poses and motion, a row for each body."""
 
     body: np.ndarray  # (bodies,) records: parameters and loads, see `time_stepping.workspace.body_fields`
-    state: np.ndarray  # (bodies, STATE_SIZE) columns of `layout`
-    rotation: np.ndarray  # (bodies, 9) body frame to world, row by row
+    state: np.ndarray  # (bodies, STATE_SIZE) states, columns of `state.layout`
+    rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
     inv_mass: np.ndarray  # (bodies,) 1/mass [1/kg]
     inv_inertia: np.ndarray  # (bodies, 6) inverse inertia, world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
     twist: np.ndarray  # (bodies, 6) velocity and angular velocity, world frame [m/s, rad/s]
     free_twist: np.ndarray  # (bodies, 6) twist without contact impulses [m/s, rad/s]
     momenta: np.ndarray  # (bodies, 12) in a resting stage: `PRE_LOAD_VELOCITY`, `LOADED_MOMENTA`; in
-    # `stepping.restitution_energy`: velocity and angular momentum before an impact, then with all of its rebound
+    # `stepping.restitution_energy`: velocity and angular momentum before an impact, then after its full rebound
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
-    box: np.ndarray  # (bodies, 6) lower, then upper corner of the bounding box, motion of the stage included [m]
+    box: np.ndarray  # (bodies, 6) lower, then upper corner of the swept box, world frame [m]
     touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
-    spin_bound: np.ndarray  # (bodies,) bound of |ω| of a body that may turn far in this stage, else 0 [rad/s]
+    spin_bound: np.ndarray  # (bodies,) bound of |ω| if the body may turn far in this stage, else 0 [rad/s]
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
 
 
 class BroadPhase(NamedTuple):
-    """Sweep and prune along one axis, and the columns that cut the other two."""
+    """Arrays of the broad phase: sweep and prune along one world axis, grid columns across it."""
 
     pairs: np.ndarray  # (pairs, 2) int, bodies whose boxes overlap
-    sorted_pairs: np.ndarray  # (pairs, 2) int, scratch: pairs by their second body
-    order: np.ndarray  # (bodies,) int, bodies by the lower end of their boxes
+    sorted_pairs: np.ndarray  # (pairs, 2) int, scratch: pairs sorted by their second body
+    order: np.ndarray  # (bodies,) int, bodies sorted by the lower end of their boxes
     merged: np.ndarray  # (bodies,) int, scratch of the merge sort
-    first_entry: np.ndarray  # (bodies + 1,) int, first position of a column in `entry`
-    cursor: np.ndarray  # (bodies,) int, position in `entry` at which a column continues
-    entry: np.ndarray  # (ENTRIES_PER_BODY * bodies,) int, bodies, column by column
+    first_entry: np.ndarray  # (bodies + 1,) int, position in `entry` at which each grid column begins
+    cursor: np.ndarray  # (bodies,) int, position in `entry` at which the search of a grid column continues
+    entry: np.ndarray  # (ENTRIES_PER_BODY * bodies,) int, bodies, grid column by grid column
 
 
 class NarrowPhase(NamedTuple):
-    """Scratch for one pair of bodies."""
+    """Scratch of the narrow phase, filled anew for each pair of bodies."""
 
-    simplex: np.ndarray  # (4, 3) of `gjk`: differences of points of the two bodies [m]
-    relative_axes: np.ndarray  # (4, 3, 3) of two blocks: rows of `box_sat`, axes of one block in the other
+    simplex: np.ndarray  # (4, 3) of `gjk`: corners of the simplex, world axes [m]
+    relative_axes: np.ndarray  # (4, 3, 3) of two blocks: axes of one in the frame of the other (`box_sat`)
     polygon: np.ndarray  # (2, 16, 3) of two blocks: clipped face in two copies, vertices (x, y, height) [m]
     edge: np.ndarray  # (2, 16, 2) int, edges into and out of each vertex of `polygon`
     hulls: Hulls | None  # tables of convex polyhedra, and scratch for a pair; None in a world without hulls
@@ -127,84 +130,84 @@ class ContactSet(NamedTuple):
     """Contact set of a stage, a row for each contact."""
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k
-    id: np.ndarray  # (contacts,) int, the same while the same features touch
-    owner: np.ndarray  # (contacts,) int, body that the normal turns with, -1: none, -2: `PARTED`
-    normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the frame of the owner
-    anchor: np.ndarray  # (contacts, 6) points of both bodies from their centres of mass, in their frames [m]
+    id: np.ndarray  # (contacts,) int, contact name: the same while the same features touch
+    owner: np.ndarray  # (contacts,) int, body that the normal turns with; -1: none; -2: `contact_set.PARTED`
+    normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the owner's frame (no owner: world)
+    anchor: np.ndarray  # (contacts, 6) contact arms of both bodies, each in its body frame [m]
     frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame
-    arm: np.ndarray  # (contacts, 6) points of both bodies from their centres of mass, world frame [m]
+    arm: np.ndarray  # (contacts, 6) contact arms of both bodies, from their centres of mass, world frame [m]
     gap: np.ndarray  # (contacts,) distance along the normal [m], negative when penetrating
     speed: np.ndarray  # (contacts,) normal velocity before the stage [m/s], negative when approaching
     mu: np.ndarray  # (contacts,) Coulomb coefficient of friction
     restitution: np.ndarray  # (contacts,) coefficient of restitution
     target: np.ndarray  # (contacts, 3) relative velocity that the solver aims at: normal, tangents [m/s]
-    impulse: np.ndarray  # (contacts, 3) normal, tangents [N s]
+    impulse: np.ndarray  # (contacts, 3) impulse on the first body in the contact frame: normal, tangents [N s]
     block: np.ndarray  # (contacts, 9) the contact's own 3 x 3 block of W = J M⁻¹ Jᵀ [1/kg]
     step: np.ndarray  # (contacts,) 1/λ_max of the tangential part of `block` [kg]
-    best_impulse: np.ndarray  # (contacts, 3) best impulses of all methods for an island [N s]
-    rebound_impulse: np.ndarray  # (contacts, 3) of `stepping.restitution_energy`: with all of the rebound [N s]
-    id_table: np.ndarray  # (slots,) int, of `warm_start`: contacts of the last stage by id, open addressing; -1: free
+    best_impulse: np.ndarray  # (contacts, 3) best impulses that any method has found for the island [N s]
+    rebound_impulse: np.ndarray  # (contacts, 3) of `stepping.restitution_energy`: of the full rebound [N s]
+    id_table: np.ndarray  # (slots,) int, of `warm_start`: hash table from id to contact of the last stage; -1: free
 
 
 class Sweeps(NamedTuple):
-    """Gauss-Seidel sweeps over the contacts of an island."""
+    """Scratch of Gauss-Seidel sweeps over the contacts of an island; a visit is the solution of one contact."""
 
     motion: np.ndarray  # (bodies, COLUMN_SIZE) twists during the sweeps, columns of `block_lu` [m/s, rad/s]
-    normal_rows: np.ndarray  # (contacts, NORMAL_ROW_SIZE) of `normal_rows`: row of the Jacobian, and M⁻¹ times it
-    visit_rows: np.ndarray  # (contacts, VISIT_SIZE) of `contact_rows`: data of the contacts, in visiting order
+    normal_rows: np.ndarray  # (contacts, NORMAL_ROW_SIZE) of `normal_rows`: rows of J and of M⁻¹ Jᵀ for the normal
+    visit_rows: np.ndarray  # (contacts, VISIT_SIZE) of `contact_rows`: contact rows in visiting order
     visit_bodies: np.ndarray  # (contacts, 2) int, `ContactSet.bodies` in visiting order
-    impulse_4_sweeps_ago: np.ndarray  # (contacts, 3) impulses of the visits, for the extrapolation [N s]
+    impulse_4_sweeps_ago: np.ndarray  # (contacts, 3) impulses in visiting order, for the extrapolation [N s]
     impulse_2_sweeps_ago: np.ndarray  # (contacts, 3) the same, two sweeps later [N s]
-    visited: np.ndarray  # (contacts,) int, number of the last visit of a contact
-    pushed: np.ndarray  # (bodies,) int, number of the last visit that changed a body's motion
+    visited: np.ndarray  # (contacts,) int, running number of the last visit of each contact
+    pushed: np.ndarray  # (bodies,) int, running number of the last visit that changed the body's motion
 
 
 class Islands(NamedTuple):
-    """Groups of bodies connected by contacts."""
+    """Islands: groups of bodies connected by contacts, each with a contact problem of its own."""
 
-    parent: np.ndarray  # (bodies,) int, union-find forest: a body of the same island
-    of_body: np.ndarray  # (bodies,) int, island of a body, -1: none
-    contacts: np.ndarray  # (contacts,) int, contacts, island by island
-    first_contact: np.ndarray  # (contacts + 1,) int, first position of an island in `contacts`
-    bodies: np.ndarray  # (bodies,) int, bodies, island by island; then in the order of elimination
-    first_body: np.ndarray  # (contacts + 1,) int, first position of an island in `bodies`
-    group_motion: np.ndarray  # (bodies, 3) of `sleeping`, at the root of a group: largest displacements in the last two
-    # windows, in the threshold; 1: a body of the group is not quiet
+    parent: np.ndarray  # (bodies,) int, union-find forest: another body of the same island, or the body itself
+    of_body: np.ndarray  # (bodies,) int, island of each body; -1: no contact
+    contacts: np.ndarray  # (contacts,) int, indices of contacts, island by island
+    first_contact: np.ndarray  # (contacts + 1,) int, position in `contacts` at which each island begins
+    bodies: np.ndarray  # (bodies,) int, bodies, island by island; later in the order of elimination
+    first_body: np.ndarray  # (contacts + 1,) int, position in `bodies` at which each island begins
+    group_motion: np.ndarray  # (bodies, 3) of `sleeping`, at the root of a group: largest displacements of its
+    # bodies in the last window and in the one before [bounding radii]; 1: a body of the group is not quiet
 
 
 class LinearSystem(NamedTuple):
-    """Sparse system of an island: a 6 x 6 block for each body, and for each touching pair."""
+    """Sparse linear system of an island: a 6 x 6 block for each body, and for each touching pair."""
 
-    diagonal: np.ndarray  # (bodies, BLOCK_SIZE) of `block_lu`: block of a body, then its inverse
+    diagonal: np.ndarray  # (bodies, BLOCK_SIZE) of `block_lu`: diagonal block of each body, then its inverse
     lower: np.ndarray  # (blocks, BLOCK_SIZE) blocks below the diagonal, column by column
     upper: np.ndarray  # (blocks, BLOCK_SIZE) blocks right of the diagonal, row by row
-    swaps: np.ndarray  # (6,) int, row exchanges of the block that is inverted
+    swaps: np.ndarray  # (6,) int, row exchanges while a block is inverted
     rank: np.ndarray  # (bodies,) int, position of a body in the elimination
-    start: np.ndarray  # (bodies,) int, later neighbours of body b: `column[start[b] : stop[b]]`
-    stop: np.ndarray  # (bodies,) int
-    column: np.ndarray  # (blocks,) int
+    start: np.ndarray  # (bodies,) int, neighbours of b eliminated after it: `column[start[b] : stop[b]]`
+    stop: np.ndarray  # (bodies,) int, see `start`
+    column: np.ndarray  # (blocks,) int, bodies, see `start`
     neighbour: np.ndarray  # (2 * blocks, 2) int, of `minimum_degree`: linked lists (body, next entry)
     links: np.ndarray  # (1,) int, number of entries in `neighbour`
     head: np.ndarray  # (bodies,) int, first entry of a body's list of neighbours
     degree: np.ndarray  # (bodies,) int, number of neighbours of a body
-    mark: np.ndarray  # (bodies,) int, stamp of the bodies that are neighbours
-    bucket: np.ndarray  # (bodies,) int, first body of each degree; doubly linked by the next two
-    ahead: np.ndarray  # (bodies,) int
-    behind: np.ndarray  # (bodies,) int
+    mark: np.ndarray  # (bodies,) int, stamp written to the neighbours of one body
+    bucket: np.ndarray  # (bodies,) int, first body of each degree, start of a doubly linked list
+    ahead: np.ndarray  # (bodies,) int, body before this one in its bucket
+    behind: np.ndarray  # (bodies,) int, body after this one in its bucket
 
 
 class Newton(NamedTuple):
-    """Iterates of `solver.proximal_newton` and `solver.interior_point`."""
+    """Scratch of `solver.proximal_newton` and `solver.interior_point`."""
 
-    defect: np.ndarray  # (bodies, COLUMN_SIZE) x - M⁻¹ Jᵀ p(x), columns of `block_lu` [m/s, rad/s]
-    before: np.ndarray  # (bodies, 6) twists before a step [m/s, rad/s]
-    change: np.ndarray  # (bodies, COLUMN_SIZE) the step, columns of `block_lu` [m/s, rad/s]
-    batch: np.ndarray  # (batches, BATCH_SIZE) int, of `contact_batches`: bodies, index of their block, contacts
-    lanes: np.ndarray  # (batches, LANES_SIZE) data of the contacts, four of them side by side
+    defect: np.ndarray  # (bodies, COLUMN_SIZE) residual x - M⁻¹ Jᵀ p(x) of the twists x, columns of `block_lu`
+    before: np.ndarray  # (bodies, 6) twists before a Newton step [m/s, rad/s]
+    change: np.ndarray  # (bodies, COLUMN_SIZE) Newton step of the twists, columns of `block_lu` [m/s, rad/s]
+    batch: np.ndarray  # (batches, BATCH_SIZE) int, columns `BATCH_BODY_A` ... of `contact_batches`
+    lanes: np.ndarray  # (batches, LANES_SIZE) data of the contacts, four contacts side by side
 
 
 class BodiesWorkspace(NamedTuple):
-    """Bodies, pairs and contacts of the world that a thread works on."""
+    """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
     bodies: Bodies
     broadphase: BroadPhase
@@ -214,6 +217,6 @@ class BodiesWorkspace(NamedTuple):
     islands: Islands
     system: LinearSystem
     newton: Newton
-    walls: np.ndarray  # (walls, WALL_SIZE) columns of `layout`
-    counts: np.ndarray  # (5,) int: `NUM_CONTACTS` and those that follow it above
-    settings: np.ndarray  # (1,) record: `bodies_setting_fields`
+    walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
+    counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
+    settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

@@ -11,24 +11,25 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
-# Contact features that two bodies, or a body and a wall, have unless one is a hull: the parts of a contact's id.
+# Room for feature numbers of one pair (two bodies, or a body and a wall) in the id of a contact. Pairs with a hull may
+# have more features.
 FEATURES_PER_PAIR = 512
 
-# Owner of the normal of a contact along the plane that parts two bodies (`stepping.passing_pairs`).
+# Owner of a contact whose normal is that of a plane between two bodies that pass each other (`stepping.passing_pairs`).
 PARTED = -2
 
-# Slops by which a contact that touches has to go in to count as stopping its bodies: more than two bodies that are
-# thinned by the slop lose along any direction, 2 √3 (`stepping.passing_pairs`).
+# Depth, in slops, that a touching contact must reach to count as stopping its bodies. It is more than 2 √3: so much do
+# two bodies lose along any direction that are thinned by a slop each (`stepping.passing_pairs`).
 DEEP_SHARE = 4.0
 
-# Distance at which bodies that turn far have arrived, where the slop is less, in the smaller bounding radius: what is
-# left is small enough for contacts to be foretold by their speed, and large beside rounding.
+# Gap at which bodies that turn far have arrived, as a share of the smaller bounding radius, unless the slop is larger.
+# From there a contact's speed predicts the time of impact well enough, and the gap is still large beside rounding.
 ARRIVAL_SHARE = 1.0e-7
 
 
 @inlined
 def row_matrix(rows, i):
-    """Nine numbers of row i."""
+    """Read nine numbers of row i of an array: a 3 x 3 matrix, row by row."""
     return (
         rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6], rows[i, 7], rows[i, 8],
     )  # fmt: skip
@@ -36,19 +37,19 @@ def row_matrix(rows, i):
 
 @inlined
 def put_vector(rows, i, first, a):
-    """Write three numbers into row i from column `first`."""
+    """Write the vector a into row i of an array, from column `first` on."""
     rows[i, first], rows[i, first + 1], rows[i, first + 2] = a
 
 
 @inlined
 def subtract(a, b):
-    """a - b."""
+    """Difference a - b of two vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @inlined
 def add_scaled(a, s, b):
-    """a + s b."""
+    """Sum a + s b of two vectors a and b, for a number s."""
     return (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2])
 
 
@@ -56,8 +57,8 @@ def add_scaled(a, s, b):
 def tangent_basis(n):
     """Two unit vectors that complete the unit vector n to a right-handed frame.
 
-    The first tangent comes from the world axis after the one that n is most along. So for a normal along a world axis
-    the frame is a permutation of the world's, exactly.
+    The first tangent is made from a world axis: the one that follows the axis along which n is largest. So for a normal
+    along a world axis, the frame is exactly a permutation of the world axes.
     """
     x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
     e = (0.0, 1.0, 0.0)
@@ -73,7 +74,10 @@ def tangent_basis(n):
 
 @inlined
 def write_contact_frame(k, n, many):
-    """Write the frame of contact k from its normal; contacts with equal normals share the frame of the first."""
+    """Write the frame (normal, two tangents) of contact k, for its unit normal n in the world frame.
+
+    If contact k - 1 has the same normal, its tangents are copied.
+    """
     frame = many.contacts.frame
     if k > 0 and n == row_vector(frame, k - 1, 0):
         t1, t2 = row_vector(frame, k - 1, 3), row_vector(frame, k - 1, 6)
@@ -86,7 +90,10 @@ def write_contact_frame(k, n, many):
 
 @inlined
 def relative_velocity(k, t, many):
-    """Velocity of contact k's point on the first body relative to the second, for twists t, world frame [m/s]."""
+    """Velocity of contact k's point on the first body relative to that on the second, world frame [m/s].
+
+    t (bodies, 6) holds the twists of all bodies.
+    """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.contacts.arm, k, 0)))
     if b >= 0:
@@ -98,19 +105,19 @@ def relative_velocity(k, t, many):
 
 @inlined
 def velocity_in_contact_frame(k, t, many):
-    """Velocity of `relative_velocity` in the contact's frame: normal, tangents."""
+    """Relative velocity at contact k for the twists t, in the contact frame: (normal, two tangents) [m/s]."""
     return qt.matvec(row_matrix(many.contacts.frame, k), relative_velocity(k, t, many))
 
 
 @inlined
 def contact_velocity(k, many):
-    """`velocity_in_contact_frame` for the present twists."""
+    """Relative velocity at contact k for the bodies' present twists, in the contact frame [m/s]."""
     return velocity_in_contact_frame(k, many.bodies.twist, many)
 
 
 @inlined
 def pair_slop(a, b, many):
-    """Largest gap of touching bodies, or of body a and a wall (b < 0) [m]."""
+    """Largest gap at which bodies a and b count as touching, or body a and a wall if b < 0 [m]."""
     if b < 0:
         return many.bodies.body[a].slop
     return min(many.bodies.body[a].slop, many.bodies.body[b].slop)
@@ -118,7 +125,10 @@ def pair_slop(a, b, many):
 
 @inlined
 def parted_slack(k, many):
-    """Allowed depth of contact k beyond its gap [m]: the thinning of bodies that pass each other; else 0."""
+    """Depth to which contact k may close beyond its gap [m]: `DEEP_SHARE` slops if its owner is `PARTED`, else 0.
+
+    The bodies of a `PARTED` contact pass each other, and `stepping.passing_pairs` takes them thinner than they are.
+    """
     if many.contacts.owner[k] != PARTED:
         return 0.0
     return DEEP_SHARE * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
@@ -126,7 +136,7 @@ def parted_slack(k, many):
 
 @inlined
 def arrival_gap(a, b, many):
-    """Gap at which a body that turns far counts as arrived at a wall (b < 0) or another body [m]."""
+    """Gap at which bodies a and b (b < 0: a wall) count as touching if one of them turns far in the stage [m]."""
     radius = many.bodies.body[a].radius
     if b >= 0:
         radius = min(radius, many.bodies.body[b].radius)
@@ -135,13 +145,13 @@ def arrival_gap(a, b, many):
 
 @inlined
 def _may_turn_far(a, b, many):
-    """True if either body may turn far in this stage (`stepping.conservative_advancement`)."""
+    """True if body a or body b may turn far in this stage (`stepping.conservative_advancement`); b < 0 is a wall."""
     return many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)
 
 
 @inlined
 def relative_acceleration_bound(k, many):
-    """Bound of the relative acceleration of a contact's points without contact [m/s²]."""
+    """Bound of the acceleration of contact k's two points relative to each other, without contact impulses [m/s²]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if b < 0:
         return many.bodies.body[a].acceleration
@@ -150,7 +160,11 @@ def relative_acceleration_bound(k, many):
 
 @inlined
 def _combine_materials(k, a, b, many):
-    """Coefficients of a pair: geometric mean of friction, larger restitution; at a wall the body's."""
+    """Write friction and restitution coefficients of contact k, between bodies a and b (b < 0: wall).
+
+    Two bodies have the geometric mean of their friction coefficients, and the larger restitution coefficient. A contact
+    with a wall has the coefficients of body a.
+    """
     mu, e = many.bodies.body[a].mu, many.bodies.body[a].restitution
     if b >= 0:
         mu, e = math.sqrt(mu * many.bodies.body[b].mu), max(e, many.bodies.body[b].restitution)
@@ -159,7 +173,11 @@ def _combine_materials(k, a, b, many):
 
 @inlined
 def _write_anchor(k, b, first, point, many):
-    """Arm and anchor of one end: from body b's centre of mass to `point` (world frame)."""
+    """Write arm and anchor of contact k for its end on body b, at `point` (world frame) [m].
+
+    Both lead from the body's centre of mass to the point, in the world frame and in the body frame. `first` is the
+    column of this end.
+    """
     arm = subtract(point, row_vector(many.bodies.state, b, 0))
     put_vector(many.contacts.arm, k, first, arm)
     put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, b), arm))
@@ -167,9 +185,10 @@ def _write_anchor(k, b, first, point, many):
 
 @inlined
 def _first_body_share(a, b, many):
-    """Weight of the first body's point in the common one, for a contact whose normal belongs to no body.
+    """Weight of body a's point in the common point of a contact of a and b whose normal belongs to no body.
 
-    The weight is 1 or 0 if one body is rounder, so that its point stays under its centre, and 1/2 if neither is.
+    The weight is 1 if a is rounder than b, 0 if b is rounder than a, else 1/2: the point of a round body stays under
+    its centre. A sphere is rounder than an ellipsoid, and an ellipsoid is rounder than a block or a hull.
     """
     one, other = many.bodies.body[a].shape, many.bodies.body[b].shape
     if one != other:
@@ -183,10 +202,10 @@ def _first_body_share(a, b, many):
 
 @inlined
 def _join_points(k, a, b, owner, gap, n, many):
-    """Let both arms of contact k end in one point, halfway across the gap along n.
+    """Let both arms of contact k, between bodies a and b, end in one point halfway across the gap along n.
 
-    Equal and opposite impulses at one point keep the angular momentum of the two, whatever lies between them. A point
-    on a face slides along it with the other body.
+    Equal and opposite impulses at one point keep the total angular momentum of both bodies, even across a gap. If one
+    body owns the normal, the other body's point is taken, since that point slides along the owner's face.
     """
     way = subtract(row_vector(many.bodies.state, a, 0), row_vector(many.bodies.state, b, 0))
     one = add_scaled(row_vector(many.contacts.arm, k, 0), -0.5 * gap, n)
@@ -202,31 +221,39 @@ def _join_points(k, a, b, owner, gap, n, many):
 
 @inlined
 def is_stopping(gap, speed, slop, h):
-    """True if a contact would stop its bodies within h: they would overlap, by slops if they touch now."""
+    """True if a contact would stop its bodies within h [s], because they would overlap at their present speed.
+
+    `gap` [m] and `speed` [m/s] are along the normal; `slop` [m] is that of the pair. Bodies that touch already must
+    close by `DEEP_SHARE` slops to count.
+    """
     return gap + h * speed < (0.0 if gap > slop else -DEEP_SHARE * slop)
 
 
 @kernel
 def add_contact(a, b, feature, owner, normal, points, gap, h, many):
-    """Add a contact to the set if it touches, or could within h; return whether there was room.
+    """Add a contact to the set if its bodies touch, or could touch within h; return False if there was no room.
 
-    A body that turns far touches at its `arrival_gap`.
+    Bodies that turn far count as touching at their `arrival_gap`.
 
     Parameters
     ----------
     a, b : int
         Bodies; b = -1 - k is wall k.
     feature : int
-        Which of the features of this pair: below `FEATURES_PER_PAIR` unless one of them is a hull.
+        Number of the touching features of this pair: below `FEATURES_PER_PAIR` unless one of the two is a hull.
     owner : int
-        Body that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass, each with its own
-        point.
+        Body that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass each other, and each
+        body keeps a point of its own.
     normal : tuple of 3 floats
-        Out of b, world frame.
+        Unit vector out of b, world frame.
     points : pair of tuples of 3 floats
         Nearest points of a and b, world frame [m].
-    gap, h : float
-        [m], [s].
+    gap : float
+        Distance along the normal [m].
+    h : float
+        Length of the stage [s].
+    many : BodiesWorkspace
+        Workspace of the world.
     """
     k, count = many.counts[NUM_CONTACTS], many.bodies.state.shape[0]
     if k == many.contacts.gap.shape[0]:
@@ -256,7 +283,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     partners = count + many.walls.shape[0]
     page = (
         feature // FEATURES_PER_PAIR * count * partners
-    )  # of features beyond the first `FEATURES_PER_PAIR`: ids after all of those
+    )  # features from `FEATURES_PER_PAIR` on have ids behind those of all lower features
     many.contacts.id[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
     _combine_materials(k, a, b, many)
     many.bodies.touched[a] = 1
@@ -270,7 +297,11 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
 
 @inlined
 def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
-    """Record the only contact of a and b, of which one is `first`; n points out of the other one."""
+    """Add the only contact of bodies a and b, with data given relative to body `first`, which is a or b.
+
+    n is the unit normal out of the other body. `on_first` and `on_second` are the points on `first` and on the other
+    body, world frame [m]. For `gap`, h and `many` see `add_contact`.
+    """
     if first == a:
         add_contact(a, b, 0, -1, n, (on_first, on_second), gap, h, many)
     else:
@@ -279,9 +310,10 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 @inlined
 def _carried_point(b, k, first, side, n, many):
-    """Point of body b in contact k from its centre of mass, world frame [m]: carried along as the body turns.
+    """Arm of body b in contact k after its motion since the contact was found, world frame [m].
 
-    On a round body this is the point with the contact's normal: turning brings another point there.
+    A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
+    contact. `first` is the column of the body's anchor; `side` is -1 for the first body and 1 for the second.
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
@@ -295,9 +327,10 @@ def _carried_point(b, k, first, side, n, many):
 
 @inlined
 def _turn_frame(k, a, b, many):
-    """Turn the frame of contact k with its bodies, and return its normal.
+    """Update the frame of contact k for the present poses of its bodies a and b; return its normal, world frame.
 
-    A face's normal turns with its body; that of two spheres stays along the line of their centres.
+    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres. Any
+    other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -314,10 +347,10 @@ def _turn_frame(k, a, b, many):
 
 @kernel
 def update_contacts(many):
-    """Move arms, frames and gaps of the contact set with the bodies.
+    """Update arms, frames and gaps of all contacts of the set after a motion of the bodies.
 
-    The gap is the distance of the two points along the normal. On a wall, the second point is the projection of the
-    first.
+    The gap is the distance of a contact's two points along its normal. The point on a wall is the projection of the
+    body's point.
     """
     for k in range(many.counts[NUM_CONTACTS]):
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]

@@ -1,7 +1,7 @@
-"""Tables of the convex polyhedra of a world: corners, faces and edges, and scratch for a pair in place.
+"""Tables of the convex polyhedra of a world: corners, faces and edges, and scratch for a pair of them.
 
-The tables are made once and only read; bodies of equal hulls share an entry. A block has one too where there are hulls:
-the unit cube's, whose corners are scaled by the half edges it has in this world.
+The tables are made once and then only read; bodies with equal hulls share an entry. In a world with hulls a block has
+an entry, too: that of the cube with half edge 1, whose corners are scaled by the block's half edges.
 """
 
 from __future__ import annotations
@@ -12,36 +12,38 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Columns of `Hulls.of`: where the corners, faces and edges of a body begin and end in the tables.
+# Columns of `Hulls.of`: positions in the tables at which corners, faces and edges of a body begin and end.
 FIRST_CORNER, LAST_CORNER, FIRST_FACE, LAST_FACE, FIRST_EDGE, LAST_EDGE = range(6)
 
-# Columns of `Hulls.edges`: its ends, and the faces on its left, seen from outside along it, and on its right.
+# Columns of `Hulls.edges`: both ends of an edge, and the faces on its left and right, seen from outside along it.
 EDGE_START, EDGE_END, EDGE_LEFT_FACE, EDGE_RIGHT_FACE = range(4)
 
 
 class Hulls(NamedTuple):
-    """Tables, and scratch for a pair of polyhedra, whose first axis is the body (0 or 1) of the pair.
+    """Tables of polyhedra, and scratch for a pair of them in the world.
 
-    The pair is stored in the axes of the world, relative to the place of the first body, so that nothing is lost far
-    from the world's origin. Corners and faces are counted from 0 in each polyhedron.
+    The members from `corner` on are scratch. Their first axis is the number of the body in the pair, 0 or 1; the first
+    axis of `polygon` and `sides` is the number of the copy. They are in world axes relative to the geometric centre of
+    the first body, so that no digits are lost far from the world's origin. Corners and faces are counted from 0 in each
+    polyhedron.
     """
 
-    of: np.ndarray  # (bodies, 6): see above; all 0 of what is round
-    corners: np.ndarray  # (v, 3) from the centre of mass, body frame [m]; ±1 of the cube
-    normals: np.ndarray  # (f, 3) out of the faces, body frame
-    loops: np.ndarray  # (f, 2) where the corners of a face begin and end in `ring`
-    ring: np.ndarray  # corners of the faces, counter-clockwise as seen from outside
-    edges: np.ndarray  # (e, 4)
-    corner: np.ndarray  # (2, corners, 3) [m]
-    normal: np.ndarray  # (2, faces, 3)
-    offset: np.ndarray  # (2, faces) of the faces' planes [m]
-    centre: np.ndarray  # (2, 3) places [m]
-    polygon: np.ndarray  # (2, corners, 3) clipped face, two copies [m]
-    sides: np.ndarray  # (2, corners, 2) edges into and out of each vertex of it
+    of: np.ndarray  # (bodies, 6) int, columns `FIRST_CORNER` ...; all 0 for spheres and ellipsoids
+    corners: np.ndarray  # (v, 3) corners from the geometric centre, body frame [m]; ±1 for the cube
+    normals: np.ndarray  # (f, 3) unit normals out of the faces, body frame
+    loops: np.ndarray  # (f, 2) int, positions in `ring` at which the corners of a face begin and end
+    ring: np.ndarray  # int, corners of each face, counter-clockwise seen from outside
+    edges: np.ndarray  # (e, 4) int, columns `EDGE_START` ...
+    corner: np.ndarray  # (2, corners, 3) corners [m]
+    normal: np.ndarray  # (2, faces, 3) unit normals out of the faces
+    offset: np.ndarray  # (2, faces) offsets of the faces' planes, normal·x [m]
+    centre: np.ndarray  # (2, 3) geometric centres [m]
+    polygon: np.ndarray  # (2, corners, 3) vertices of a clipped face, two copies [m]
+    sides: np.ndarray  # (2, corners, 2) int, edges into and out of each vertex of `polygon`
 
 
 class Solid(NamedTuple):
-    """Convex polyhedron for `make_hulls`: members of `physics.mass.polyhedron.Polyhedron`."""
+    """Convex polyhedron for `make_hulls`, with the same members as `physics.mass.polyhedron.Polyhedron`."""
 
     vertices: np.ndarray
     normals: np.ndarray
@@ -50,7 +52,7 @@ class Solid(NamedTuple):
 
 
 def _cube() -> Solid:
-    """Cube with the half edge 1; corner k as in `support_function.vertex_height`."""
+    """Cube with half edge 1; its corner k is that of `support_function.vertex_height`."""
     corners = np.array([[1.0 if k >> j & 1 else -1.0 for j in range(3)] for k in range(8)])
     normals, loops = [], []
     for axis, sign in product(range(3), (1.0, -1.0)):
@@ -66,12 +68,15 @@ def _cube() -> Solid:
     return Solid(corners, np.array(normals), loops, edges)
 
 
-# What a block is scaled from where there are hulls.
+# Table entry of every block, in a world with hulls.
 CUBE = _cube()
 
 
 def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
-    """Tables for bodies, None for round ones; equal hulls share an object, and blocks share `CUBE`."""
+    """Build the tables for the bodies of a world, one `Solid` per body, None for a sphere or ellipsoid.
+
+    Bodies that are given the same object share an entry; blocks are given `CUBE`.
+    """
     kinds = {id(body): body for body in bodies if body is not None}
     corners, normals, loops, ring, edges, place = [], [], [], [], [], {}
     for key, solid in kinds.items():
@@ -96,5 +101,8 @@ def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
 
 
 def clipped_face_capacity(bodies: Sequence[Solid | None]) -> int:
-    """Largest number of corners of a face clipped by another; each side cuts off one corner and makes two."""
+    """Largest number of corners of a face of one body, clipped by the sides of a face of another.
+
+    `bodies` is as in `make_hulls`. Each clipping side cuts off at least one corner and makes two.
+    """
     return 2 * max([len(loop) for body in bodies if body is not None for loop in body.loops], default=0)

@@ -1,4 +1,4 @@
-"""Kinematics of the bodies of a world: present rotations, centres, inverse inertias and twists."""
+"""Kinematics of the bodies of a world: rotations, geometric centres, inverse inertias and twists of their states."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from physics.kernels.state.body import angular_velocity, principal_attitude, rea
 
 @inlined
 def update_body_pose(b, offset_frame, many):
-    """Compute rotation, geometric centre and inverse inertia of body b from its present state, world frame."""
+    """Compute rotation, geometric centre and inverse inertia of body b from its state, in the world frame.
+
+    `offset_frame` is None unless some body has an offset frame (`state.groups.FlightSwitches`). Results are written to
+    `many.bodies`.
+    """
     x, q, _, _ = read_state(many.bodies.state, b)
     body = many.bodies.body[b]
     R = qt.to_matrix(q)
@@ -34,7 +38,7 @@ def update_body_pose(b, offset_frame, many):
 
 @inlined
 def update_poses_and_twists(offset_frame, many):
-    """Do `update_body_pose`, and compute the twist, for every body."""
+    """Compute rotation, geometric centre, inverse inertia and twist of every body from its state."""
     for b in range(many.bodies.state.shape[0]):
         update_body_pose(b, offset_frame, many)
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))

@@ -1,8 +1,10 @@
 """Sleep in worlds whose bodies touch each other: touching bodies fall asleep and wake together.
 
-A group is what the broad phase connects: bodies whose boxes overlap, and bodies that springs tie together. Whatever is
-in contact is in one group, so that a group that sleeps has no contact with anything awake; a body that comes near is
-found by the broad phase first, and wakes the group before contacts are searched.
+A group consists of bodies that pairs of the broad phase (overlapping swept boxes) or springs connect. All bodies in
+contact belong to one group, so that a sleeping group has no contact with an awake body. The broad phase finds a body
+that comes near, and the group wakes before contacts are searched.
+
+`world` is the index of the world, `count` the number of its bodies, `sleep` the `state.sleeping.Sleep` of all worlds.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ from physics.kernels.state.sleeping import (
 
 @inlined
 def wake_group(world, count, group, sleep):
-    """Wake all bodies of a group of a world of `count` bodies."""
+    """Wake all bodies of a group in a world of `count` bodies.
+
+    `group` is the number of the group, stored in `sleep.rows[:, SLEEP_GROUP]` for each of its bodies.
+    """
     for i in range(world * count, (world + 1) * count):
         if sleep.rows[i, SLEEP_GROUP] == group:
             wake_body(i, sleep)
@@ -37,7 +42,7 @@ def wake_group(world, count, group, sleep):
 
 @inlined
 def wake_world(world, count, sleep):
-    """Wake all bodies, if the scene declares sleep."""
+    """Wake all `count` bodies of a world; does nothing if the scene declares no sleep (`sleep` is None)."""
     if sleep is None:
         return
     for i in range(world * count, (world + 1) * count):
@@ -55,7 +60,11 @@ def is_world_asleep(world, count, sleep):
 
 @inlined
 def is_staying_asleep(world, count, wrench, sleep):
-    """True if every body of a world sleeps and stays asleep under these wrenches; wakes the others' groups."""
+    """True if every body of a world sleeps and none has a new wrench.
+
+    `wrench` (rows, 6) holds the wrenches on the bodies of all worlds. A body whose wrench has changed wakes with its
+    group.
+    """
     for i in range(world * count, (world + 1) * count):
         if has_new_wrench(i, wrench, sleep):
             if is_asleep(i, sleep):
@@ -66,7 +75,10 @@ def is_staying_asleep(world, count, wrench, sleep):
 
 @kernel
 def wake_touched_groups(world, sleep, many):
-    """Wake every sleeping group near an awake body: a pair of the broad phase with one sleeping body."""
+    """Wake every sleeping group of a world that forms a near pair with an awake body.
+
+    A group that wakes may wake others, so that this repeats until no near pair has one sleeping and one awake body.
+    """
     first, is_waking = world * many.bodies.state.shape[0], True
     while is_waking:
         is_waking = False
@@ -80,7 +92,7 @@ def wake_touched_groups(world, sleep, many):
 
 @inlined
 def _union_near_pairs(many):
-    """Link every body to the first one of its group in `many.islands.parent`."""
+    """Join bodies that near pairs or springs connect into groups, as a union-find forest in `many.islands.parent`."""
     for b in range(many.islands.parent.shape[0]):
         many.islands.parent[b] = b
     for k in range(many.counts[NUM_PAIRS]):
@@ -90,10 +102,11 @@ def _union_near_pairs(many):
 
 @kernel
 def put_quiet_groups_to_sleep(world, sleep, many):
-    """Put groups to sleep whose bodies have all been quiet for long enough, with no growing motion.
+    """Put each group of a world to sleep if all its bodies are quiet and its motion does not grow.
 
-    The root of each group in `many.islands.group_motion` gathers the largest displacements of its last two windows, and
-    whether any of its bodies is not quiet.
+    A body is quiet after `WINDOWS_BEFORE_SLEEP` quiet windows in a row. `many.islands.group_motion` gathers, at the
+    root of each group in the union-find forest, the largest displacements of its bodies in the last two windows. A flag
+    there says whether a body of the group is not quiet.
     """
     count, found = many.bodies.state.shape[0], many.islands.group_motion
     first = world * count
@@ -116,7 +129,7 @@ def put_quiet_groups_to_sleep(world, sleep, many):
 
 @kernel
 def update_sleep(world, h, sleep, many):
-    """Update the windows of all awake bodies after a substep of h, and put quiet groups to sleep."""
+    """Update the sleep windows of all awake bodies of a world after a substep of h [s]; put quiet groups to sleep."""
     first, is_time = world * many.bodies.state.shape[0], False
     for b in range(many.bodies.state.shape[0]):
         if not is_asleep(first + b, sleep) and update_sleep_window(

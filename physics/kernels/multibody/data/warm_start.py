@@ -1,7 +1,8 @@
 """Warm start of a world's contacts: impulses of the last stage, from which the next solve starts.
 
-Contacts are recognised by their ids. Impulses are kept in the world frame, so that a contact whose frame has turned
-starts with the same force.
+Contacts are found again by their ids. Impulses are stored in the world frame, so that the force stays the same if a
+contact's frame has turned. `memory` (worlds, columns) has the layout of `arrays.WARM_CONTACT_ID` and its neighbours.
+The table is `many.contacts.id_table`, a hash table with open addressing from ids to stored contacts.
 """
 
 from __future__ import annotations
@@ -26,19 +27,22 @@ from physics.kernels.state.sleeping import is_asleep
 
 @inlined
 def _contact_column(k):
-    """First column of contact k."""
+    """First column of stored contact k in a row of `memory`."""
     return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * k
 
 
 @inlined
 def _hash_slot(contact_id, table):
-    """Start of the search for an id in the table: its low bits, well mixed (Knuth's multiplicative method)."""
+    """Slot of the hash table `table` at which the search for an id begins (Knuth's multiplicative method)."""
     return ((contact_id * 2654435761) >> 16) & (table.shape[0] - 1)
 
 
 @inlined
 def _find_remembered(contact_id, world, memory, table):
-    """Index of the remembered contact of this id, or -1."""
+    """Index of the contact with this id among the stored contacts of a world; -1: none.
+
+    It is looked up in the hash table `table`.
+    """
     at = _hash_slot(contact_id, table)
     while table[at] >= 0:
         if memory[world, _contact_column(table[at]) + WARM_CONTACT_ID] == contact_id:
@@ -49,7 +53,7 @@ def _find_remembered(contact_id, world, memory, table):
 
 @inlined
 def _index_ids(world, memory, table):
-    """Fill the table with the remembered contacts."""
+    """Enter the contacts of a world that are stored in `memory` into the empty hash table `table`."""
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
@@ -59,7 +63,10 @@ def _index_ids(world, memory, table):
 
 @inlined
 def _clear_ids(world, memory, table):
-    """Clear the table; the cost grows with the contacts, not with the table."""
+    """Empty the hash table `table` again, by removing the contacts of a world that are stored in `memory`.
+
+    This is faster than to clear every slot, since most slots are free.
+    """
     for k in range(int(memory[world, WARM_CONTACT_COUNT])):
         at = _hash_slot(int(memory[world, _contact_column(k) + WARM_CONTACT_ID]), table)
         while table[at] >= 0:
@@ -69,7 +76,12 @@ def _clear_ids(world, memory, table):
 
 @kernel
 def load_warm_impulses(n, world, h, friction, memory, many):
-    """Impulses of the n contacts of the set from the last stage, scaled to a stage of length h; zero where new."""
+    """Write the warm start: impulses of the n contacts of the set, from those stored in `memory` at the last stage.
+
+    Impulses are scaled from the last stage's length to h [s], the length of this one. A contact that was not stored
+    starts from zero. Without friction (`friction` is None) only normal impulses are taken. `world` is the index of the
+    world.
+    """
     length, table = memory[world, WARM_STAGE_LENGTH], many.contacts.id_table
     scale = h / length if length > 0.0 else 0.0
     _index_ids(world, memory, table)
@@ -89,7 +101,10 @@ def load_warm_impulses(n, world, h, friction, memory, many):
 
 @inlined
 def _keep_sleeping(world, h, sleep, memory, many):
-    """Move the contacts of sleeping bodies to the front, with impulses of a stage of length h; return their number."""
+    """Move the stored contacts of sleeping bodies to the front of a world's row of `memory`; return their number.
+
+    Their impulses are scaled to a stage of length h [s]. All other stored contacts are lost.
+    """
     if sleep is None:
         return 0
     first, count, length = world * many.bodies.state.shape[0], 0, memory[world, WARM_STAGE_LENGTH]
@@ -106,7 +121,10 @@ def _keep_sleeping(world, h, sleep, memory, many):
 
 @kernel
 def store_warm_impulses(n, world, h, sleep, memory, many):
-    """Keep the n contacts of this stage, of length h, and those of sleeping bodies, as far as there is room."""
+    """Store the impulses of the n contacts in `memory` after a stage of length h [s], as the next warm start.
+
+    Stored contacts of sleeping bodies come first and stay; contacts beyond the room in `memory` are left out.
+    """
     before = _keep_sleeping(world, h, sleep, memory, many)
     n = min(n, many.contacts.gap.shape[0] - before)
     memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, before + n
@@ -129,13 +147,13 @@ def store_warm_impulses(n, world, h, sleep, memory, many):
 
 @inlined
 def clear_warm_start(world, memory):
-    """Forget all contacts, as after a change of places."""
+    """Forget all stored contacts of a world, as after a user has moved its bodies."""
     memory[world, WARM_STAGE_LENGTH] = memory[world, WARM_CONTACT_COUNT] = 0.0
 
 
 @inlined
 def clear_awake_warm_start(world, h, sleep, memory, many):
-    """Forget all contacts except those of sleeping bodies, in a stage of length h."""
+    """Forget all stored contacts of a world except those of sleeping bodies, after a stage of length h [s]."""
     if sleep is None:
         memory[world, WARM_STAGE_LENGTH], memory[world, WARM_CONTACT_COUNT] = h, 0.0
     else:
@@ -144,7 +162,7 @@ def clear_awake_warm_start(world, h, sleep, memory, many):
 
 @inlined
 def copy_contact(k, to, many):
-    """Copy contact k of the set to another place in it, except columns that a stage fills later."""
+    """Copy row k of the contact set to row `to`, except columns that later parts of a stage fill."""
     many.contacts.id[to], many.contacts.owner[to], many.contacts.gap[to], many.contacts.speed[to] = (
         many.contacts.id[k],
         many.contacts.owner[k],

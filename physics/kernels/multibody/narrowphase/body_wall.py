@@ -1,4 +1,4 @@
-"""Contacts of one body with one wall: vertices of a block, corners of a hull, the nearest point of a round body."""
+"""Contacts of a body with a wall: vertices of a block, corners of a hull, the nearest point of a round body."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from physics.kernels.state.layout import BLOCK, VERTEX_COUNT, WALL_NORMAL, WALL_
 
 @kernel
 def collide_body_wall(b, wall, margin, h, many):
-    """Add the contacts of body b with a wall that are at most `margin` [m] from it."""
+    """Add the contacts of body b, a block, sphere or ellipsoid, with a wall whose gaps are at most `margin` [m].
+
+    `wall` is the wall's index, h the length of the stage [s].
+    """
     body, R = many.bodies.body[b], row_matrix(many.bodies.rotation, b)
     n, x = row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.center, b, 0)
     d = qt.dot(n, x) - many.walls[wall, WALL_OFFSET]
@@ -38,7 +41,10 @@ def collide_body_wall(b, wall, margin, h, many):
 
 @kernel
 def collide_hull_wall(b, wall, margin, h, many):
-    """Add the contacts of hull b with a wall: its corners that are at most `margin` [m] from it, by number."""
+    """Add the contacts of hull b with a wall: one for each corner whose gap is at most `margin` [m].
+
+    `wall` is the wall's index, h the length of the stage [s]. The feature of a contact is the number of its corner.
+    """
     n, x, first = (
         row_vector(many.walls, wall, WALL_NORMAL),
         row_vector(many.bodies.center, b, 0),

@@ -1,8 +1,8 @@
-"""Two blocks: separating axes, then the clipped face or the nearest points of two edges.
+"""Contacts of two blocks: separating axis test, then the clipped face or the nearest points of two edges.
 
-Of the fifteen axes that can separate two blocks (three face normals of each, nine products of edges) the one with the
-largest separation is the contact normal. On a face normal the opposite face of the other block is clipped by the sides
-of this one, so that up to eight points touch, each with an id that stays while the same edges cross.
+Of the fifteen axes that can separate two blocks (three face normals of each, nine products of edges), the one with the
+largest separation is the contact normal. If it is a face normal, the opposite face of the other block is clipped by the
+sides of that face. So up to eight points touch. Each has an id that stays the same while the same edges cross.
 """
 
 from __future__ import annotations
@@ -33,14 +33,17 @@ from physics.kernels.multibody.narrowphase.box_sat import (
     write_relative_axes,
 )
 
-# Names: face (of a: 0 to 2, of b: 3 to 5) * 64 + edge in * 8 + edge out, then edges.
+# Features of a contact: face (of a: 0 to 2, of b: 3 to 5) * 64 + edge in * 8 + edge out; then pairs of edges.
 _FEATURES_PER_FACE = 64
 _FIRST_EDGE_FEATURE = 6 * _FEATURES_PER_FACE
 
 
 @inlined
 def _reference_face(a, b, face, many):
-    """(block with the face, other block, axis, its sense towards the other)."""
+    """Find the block to which `face` belongs: (block, other block, body axis across the face, sign).
+
+    `face` is numbered as in `box_sat.max_box_face_separation`. The sign is that of the axis towards the other block.
+    """
     if face < 3:
         return a, b, face, math.copysign(1.0, many.narrowphase.relative_axes[FROM_A, 0, face])
     return b, a, face - 3, -math.copysign(1.0, many.narrowphase.relative_axes[FROM_B, 0, face - 3])
@@ -48,7 +51,7 @@ def _reference_face(a, b, face, many):
 
 @inlined
 def _clip_face(a, b, face, many):
-    """Clip the face opposite to this one by its sides: (copy of the polygon, vertices)."""
+    """Clip the opposite face of the other block by the sides of `face`: (copy of the polygon, number of vertices)."""
     r, o, axis, sign = _reference_face(a, b, face, many)
     write_incident_face(r, o, axis, sign, many)
     d, slop = many.bodies.body[r].dims, pair_slop(a, b, many)
@@ -64,12 +67,13 @@ def _clip_face(a, b, face, many):
 
 @inlined
 def _parallel_edge_normal(o, out, rim, point, many):
-    """Normal of two parallel edges that touch: the middle of all allowed normals.
+    """Contact normal of two parallel edges that touch: the middle of all normals that both edges allow.
 
-    An edge of a convex body allows every direction between the normals of its two faces. For the one block these are
-    the directions from `out` to `rim`. For block o they lie between the two normals, reversed, of the faces whose edge
-    passes `point`. Both ranges contain `out`, and that of o ends before `rim`, a quarter turn from its other end. So
-    both allow the directions between `out` and that end.
+    An edge of a convex body allows every direction between the normals of its two faces. For the block with the
+    reference face, these are the directions from `out`, that face's normal, to `rim`, the normal of the next face. For
+    block o they lie between the two normals, reversed, of the faces whose edge passes `point`. Both ranges contain
+    `out`. The range of o ends before `rim`, a quarter turn from its other end. So both allow the directions between
+    `out` and that end.
     """
     end, most, along = out, 0.0, qt.cross(out, rim)
     w = subtract(point, row_vector(many.bodies.center, o, 0))
@@ -87,13 +91,18 @@ def _parallel_edge_normal(o, out, rim, point, many):
 
 @inlined
 def _point_above_face(r, x, y, s, t, many):
-    """Point s along x and t along y from the centre of block r [m]."""
+    """Point at s along the unit vector x and t along y from the centre of block r, world frame [m]."""
     return add_scaled(add_scaled(row_vector(many.bodies.center, r, 0), s, x), t, y)
 
 
 @inlined
 def _add_face_contacts(a, b, face, source, count, least, h, many):
-    """Contacts between a face and the clipped face of the other block, lifted until none has a gap < least."""
+    """Add the contacts between `face` and the clipped face of the other block, given as a polygon.
+
+    The polygon has `count` vertices in copy `source` of `many.narrowphase.polygon`. It is lifted along the normal until
+    no contact has a gap below `least` [m]. If the blocks touch with two parallel edges, only the ends of the common
+    edge are added. h is the length of the stage [s].
+    """
     r, o, axis, sign = _reference_face(a, b, face, many)
     d = many.bodies.body[r].dims
     if count == 0:
@@ -130,7 +139,7 @@ def _add_face_contacts(a, b, face, source, count, least, h, many):
 
 @inlined
 def _middle_of_edge(b, k, n, many):
-    """Middle of the edge of block b along its axis k that reaches furthest along n, world frame [m]."""
+    """Middle of the edge of block b along its body axis k that reaches furthest along n, world frame [m]."""
     R, d = many.bodies.rotation, many.bodies.body[b].dims
     point = row_vector(many.bodies.center, b, 0)
     for j in range(3):
@@ -142,7 +151,11 @@ def _middle_of_edge(b, k, n, many):
 
 @inlined
 def _add_edge_contact(a, b, edges, gap, h, many):
-    """Add the contact of two edges, at their nearest points."""
+    """Add the contact of two crossing edges of blocks a and b at their nearest points, with a given gap [m].
+
+    `edges` = 3 i + j are the edge along body axis i of a and that along body axis j of b. h is the length of the stage
+    [s].
+    """
     i, j = edges // 3, edges % 3
     x, y = body_axis(many.bodies.rotation, a, i), body_axis(many.bodies.rotation, b, j)
     n = qt.cross(x, y)
@@ -161,10 +174,10 @@ def _add_edge_contact(a, b, edges, gap, h, many):
 
 @kernel
 def collide_blocks(a, b, margin, h, many):
-    """Add the contacts of blocks a and b that are at most `margin` [m] apart.
+    """Add the contacts of blocks a and b that are at most `margin` [m] apart; h is the length of the stage [s].
 
-    If a face separates the blocks, or nearly does, and a part of the other block is above it, no product of edges can
-    have a larger distance: that part touches.
+    If a face separates the blocks, or nearly so, and a part of the other block is above it, that part touches: no
+    product of edges can have a larger separation.
     """
     write_relative_axes(a, b, many)
     apart, face = max_box_face_separation(a, b, margin, many)

@@ -1,7 +1,10 @@
-"""Clip the face of a block that is opposite to a face of another block by the sides of that face.
+"""Clip the incident face of a block by the sides of the reference face of another block.
 
-The polygon is in the frame of the other block's face: coordinates along it, and height above the block's centre. Every
-vertex knows the edges into and out of it, which name it while the same edges cross.
+The reference face is the one whose normal separates the blocks; the incident face is the face of the other block most
+opposed to it. The polygon `many.narrowphase.polygon` exists in two copies; a clip reads one and writes the other. Its
+vertices are in the frame of the reference face: two coordinates along the face, and the height above its block's
+centre. For every vertex `many.narrowphase.edge` has the edges into and out of it, which identify the vertex as long as
+the same edges cross. Edges 0 to 3 are those of the incident face, 4 to 7 those of the reference face.
 
 References
 ----------
@@ -21,14 +24,14 @@ from physics.kernels.multibody.narrowphase.box_sat import body_axis
 
 @inlined
 def _crossing(p, q, axis, bound):
-    """Point of the edge from p to q at coordinate `bound`."""
+    """Point of the line through vertices p and q at which coordinate `axis` is `bound`."""
     t = (bound - p[axis]) / (q[axis] - p[axis])
     return add_scaled(p, t, subtract(q, p))
 
 
 @inlined
 def is_polygon_inside(source, count, axis, sign, bound, many):
-    """True if sign * coordinate <= bound for every vertex of the polygon in copy `source`: nothing to clip."""
+    """True if sign * coordinate `axis` <= bound for all `count` vertices of `many.narrowphase.polygon[source]`."""
     furthest = -math.inf
     for k in range(count):
         furthest = max(furthest, sign * many.narrowphase.polygon[source, k, axis])
@@ -37,10 +40,12 @@ def is_polygon_inside(source, count, axis, sign, bound, many):
 
 @inlined
 def clip_polygon(source, count, axis, sign, bound, side, slop, many):
-    """Clip the polygon in copy `source` by sign * coordinate <= bound; return its vertices, now in the other copy.
+    """Clip a polygon by sign * coordinate `axis` <= bound; return the new number of vertices.
 
-    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
-    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
+    The polygon has `count` vertices in copy `source` of `many.narrowphase.polygon`; the result is written to the other
+    copy. `side` is the number of the clipping edge. A vertex outside by at most the slop [m] stays, too, since it would
+    otherwise come and go by rounding where two faces end together. It takes the place of the crossing of its edge with
+    the bound, which may be far away if the edge is nearly parallel to it.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0
@@ -64,9 +69,11 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
 
 @inlined
 def write_incident_face(r, o, axis, sign, many):
-    """Write the face of block o most opposite to the face of block r into copy 0, in the frame of that face.
+    """Write the incident face of block o, the one most opposed to a face of block r, as a polygon.
 
-    Coordinates along the axes behind `axis` of r, and height along sign * axis above the centre of r.
+    The polygon is copy 0 of `many.narrowphase.polygon`. The face of r has the outward normal sign * body axis `axis`.
+    Coordinates of the vertices are along the next two body axes of r; heights are along the outward normal, above the
+    centre of r [m].
     """
     R, d, p = many.bodies.rotation, many.bodies.body[o].dims, many.narrowphase.polygon
     out = body_axis(R, r, axis)
@@ -93,15 +100,16 @@ def write_incident_face(r, o, axis, sign, many):
 
 @inlined
 def clamp_to_half_width(s, bound):
-    """Number s, limited to at most `bound` from 0."""
+    """Clamp the number s to the interval from -bound to bound."""
     return min(max(s, -bound), bound)
 
 
 @inlined
 def keep_deepest_vertex(x, y, many):
-    """Keep only the lowest vertex of copy 0, moved above the face of half edges x and y; return its copy.
+    """Reduce the polygon in copy 0 of `many.narrowphase.polygon` to its lowest vertex; return the copy, 0.
 
-    This serves blocks that are apart sideways as well, since the plane between them still separates them.
+    The vertex is moved over the reference face, which has the half edges x and y [m]. This serves blocks that are also
+    apart sideways: the plane of the face still separates them.
     """
     p, edge, low = many.narrowphase.polygon, many.narrowphase.edge, 0
     for k in range(4):
@@ -118,7 +126,7 @@ def keep_deepest_vertex(x, y, many):
 
 @inlined
 def min_vertex_height(source, count, polygon):
-    """Least height of a vertex of the polygon in copy `source`."""
+    """Least height of the first `count` vertices of `polygon[source]` [m]."""
     low = math.inf
     for k in range(count):
         low = min(low, polygon[source, k, 2])
@@ -127,10 +135,11 @@ def min_vertex_height(source, count, polygon):
 
 @inlined
 def find_rim_edge(d, axis, source, count, slop, many):
-    """Edge along the face's rim that holds all low vertices of the polygon: (its ends, axis of the rim, its sense).
+    """Find the edge of the reference face on which all low vertices of the polygon lie, if there is one.
 
-    Vertices within a slop of the lowest one are low, and vertices within two slops of the rim are on it. Without such
-    an edge the ends are -1.
+    d are the half edges of the block with the reference face, `axis` the body axis across it. A vertex of the polygon
+    (`count` vertices in copy `source`) is low within a slop of the lowest one, and on an edge within two slops of it.
+    Returns (first vertex, last vertex, body axis towards the edge, its sign); the vertices are -1 without such an edge.
     """
     p, low = many.narrowphase.polygon, min_vertex_height(source, count, many.narrowphase.polygon)
     for side in range(4):

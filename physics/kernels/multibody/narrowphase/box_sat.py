@@ -1,4 +1,6 @@
-"""The fifteen axes that can separate two blocks: three face normals of each and nine products of edges.
+"""Separating axis test of two blocks: three face normals of each, and nine products of their edges.
+
+The separation of two blocks along an axis is the gap between their projections on it; negative if these overlap.
 
 References
 ----------
@@ -13,27 +15,32 @@ from physics.compiler.decorators import inlined
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 
-# Squared sine of the angle between two edges below which they are parallel: their product says nothing that a face
-# does not. Rounding of the nine products is 1e-16; its square root would still be noise.
+# Squared sine of the angle between two edges below which they count as parallel. Their product is then skipped, since
+# face normals cover its direction. The value is far above the rounding of the nine products, 1e-16.
 PARALLEL_SINE_SQUARED = 1.0e-12
 
 # Cosine of the angle between two face normals, or between the product of two edges and a face normal, above which the
-# faces count as lying flat on each other (11 degrees). One point or one edge would let them tip to and fro; the clipped
-# face holds them, at the distance that the edges say.
+# faces count as lying flat on each other (11 degrees). One point or one edge would let them tip to and fro. So they
+# touch with the clipped face, at the separation along the product of edges.
 FLAT_COSINE = 0.98
 
+# Rows of `many.narrowphase.relative_axes` (`write_relative_axes`).
 AXES, SIZES, FROM_A, FROM_B = 0, 1, 2, 3
 
 
 @inlined
 def body_axis(R, b, k):
-    """Axis k of body b, world frame."""
+    """Body axis k of body b in the world frame; R (bodies, 9) holds the rotation matrices."""
     return (R[b, k], R[b, 3 + k], R[b, 6 + k])
 
 
 @inlined
 def write_relative_axes(a, b, many):
-    """Write `many.narrowphase.relative_axes`: axes of b in a, their absolute values, vector from a to b in both."""
+    """Write `many.narrowphase.relative_axes`: the poses of blocks a and b relative to each other.
+
+    Its rows are `AXES` (axes of b in the frame of a), `SIZES` (their absolute values), `FROM_A` and `FROM_B` (the
+    vector from a to b in the frame of each).
+    """
     R, mix, place = many.bodies.rotation, many.narrowphase.relative_axes, many.bodies.center
     for i in range(3):
         for j in range(3):
@@ -47,9 +54,10 @@ def write_relative_axes(a, b, many):
 
 @inlined
 def max_box_face_separation(a, b, margin, many):
-    """(separation, face) of the most separating face normal; a tie goes to the first block.
+    """Find the face normal along which blocks a and b are farthest apart: (separation [m], face).
 
-    The search stops at a face that separates by more than `margin` [m].
+    Faces 0 to 2 are those across the axes of a, 3 to 5 those of b. A later face is taken only if it separates by a slop
+    more, so that ties go to block a. The search stops at a face that separates by more than `margin` [m].
     """
     S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.body[a].dims, many.bodies.body[b].dims
     way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
@@ -72,7 +80,11 @@ def max_box_face_separation(a, b, margin, many):
 
 @inlined
 def max_box_edge_separation(a, b, margin, many):
-    """(separation, 3 i + j) of edges i of a and j of b that separate most; ties as `max_box_face_separation`."""
+    """Find the edge product along which blocks a and b are farthest apart: (separation [m], 3 i + j).
+
+    The product is that of edge direction i of a and edge direction j of b. Of equal separations the first is taken. The
+    search stops at a product that separates by more than `margin` [m].
+    """
     C, S, way = (
         many.narrowphase.relative_axes[AXES],
         many.narrowphase.relative_axes[SIZES],
@@ -99,7 +111,10 @@ def max_box_edge_separation(a, b, margin, many):
 
 @inlined
 def is_face_flat_on_other(face, many):
-    """True if a face of the other block is nearly parallel to this one: the two lie flat on each other."""
+    """True if a face of the other block is nearly parallel to `face`: the two lie flat on each other.
+
+    `face` is numbered as in `max_box_face_separation`.
+    """
     S, most = many.narrowphase.relative_axes[SIZES], 0.0
     for k in range(3):
         most = max(most, S[face, k] if face < 3 else S[k, face - 3])
@@ -108,10 +123,11 @@ def is_face_flat_on_other(face, many):
 
 @inlined
 def is_edge_axis_face_normal(edges, face, many):
-    """True if the product of two edges is nearly a face normal: the faces then lie flat on each other.
+    """True if the product of two edges is nearly the normal of `face`: the faces then lie flat on each other.
 
-    Both normals point towards the other block's centre. For slender blocks that cross far from their centres, the face
-    that looks there may be on the far side of the touching one.
+    `edges` and `face` are numbered as in `max_box_edge_separation` and `max_box_face_separation`. Product and normal
+    are both taken towards the other block's centre, and must agree in sign. They do not for slender blocks that cross
+    far from their centres, if `face` is opposite to the touching face.
     """
     C, i, j, way = (
         many.narrowphase.relative_axes[AXES],

@@ -1,4 +1,4 @@
-"""Narrow phase: contacts of every body with every wall, and of every near pair."""
+"""Narrow phase: find the contacts of every body with every wall, and of every near pair."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ from physics.kernels.state.sleeping import is_asleep
 
 @shared_kernel
 def find_contacts(h, ellipsoids, hulls, world, sleep, many):
-    """Write the contact set of the bodies in their present state, for a stage of length h.
+    """Find all contacts of a world in its bodies' present state, for a stage of length h [s].
 
-    `ellipsoids` and `hulls` are None if the scene has none, `sleep` if it does not declare it. Sleeping bodies that
-    nothing approaches are left out.
+    Writes the contact set `many.contacts` and the numbers of contacts and near pairs in `many.counts`. `ellipsoids` and
+    `hulls` are None if the scene has none; `sleep` is None if it declares no sleep. Sleeping bodies that nothing
+    approaches are left out. `world` is the index of the world.
     """
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = many.counts[NUM_STOPPING] = 0
     bodies = many.bodies.body

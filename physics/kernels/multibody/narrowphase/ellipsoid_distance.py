@@ -1,19 +1,24 @@
 """Separation of an ellipsoid and another convex body, by Newton's method on the direction between them.
 
-With support functions s(n) of the two bodies about their centres (both symmetric) and d from the centre of b to that
-of a, the bodies are apart along the unit vector n by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their distance or,
-negative, what moves them apart by the least way. Its gradient is the vector from the point of b to that of a with
-normal n: it must be along n. For an ellipsoid s = √(nᵀDn), D = R diag(a²) Rᵀ, with the point Dn/s and the second
-derivative (D - p pᵀ)/s, p that point; so that on the sphere of directions one step is
+Let a be the ellipsoid and b the other body, an ellipsoid, sphere or block. s_a and s_b are their support functions
+about their centres (both symmetric), and d is the vector from the centre of b to that of a. Along a unit vector n the
+bodies are apart by σ(n) = n·d - s_a(n) - s_b(n). The largest σ is their distance; if it is negative, it is the shortest
+way that moves them apart. The gradient g of σ is the vector from the point of b with normal n to the point of a with
+normal -n. At the maximum it is along n.
+
+An ellipsoid with semi-axes rᵢ and rotation matrix R has s = √(nᵀDn) with D = R diag(rᵢ²) Rᵀ. Its point with normal n is
+p = Dn/s, and the second derivative of s is H = (D - p pᵀ)/s. So one Newton step δ on the sphere of directions satisfies
 
     (H_a + H_b + σ) δ = g - (g·n) n,        δ ⟂ n, for H n = 0.
 
-Where the bodies overlap σ is left out: its size is small beside the radii of curvature then, and the sum stays positive
-definite. A block has s = Σ bᵢ|nᵢ|, which has a kink where nᵢ = 0, and there the largest σ mostly is: on a face two of
-the nᵢ are 0, on an edge one. Such an nᵢ stays 0 while the gradient is no larger than bᵢ; a step that would pass through
+Where the bodies overlap, σ < 0 is left out of the matrix: it is small beside the radii of curvature then, and the
+matrix stays positive definite.
+
+A block has s = Σ bᵢ|nᵢ|, with half edges bᵢ. It has a kink where nᵢ = 0, and the largest σ is mostly there: on a face
+two of the nᵢ are 0, on an edge one. Such an nᵢ stays 0 while the gradient is at most bᵢ. A step that would pass through
 0 ends there.
 
-All in the frame of b.
+Vectors are in the frame of b.
 """
 
 from __future__ import annotations
@@ -26,19 +31,22 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_ordered_contact, add_scaled, row_matrix, subtract
 from physics.kernels.state.layout import BLOCK, ELLIPSOID
 
-# Newton steps at most; five are usual from a centre to centre start.
+# Largest number of Newton steps; five are usual if the start is the direction between the centres.
 _NEWTON_STEPS = 40
 
-# Turn of the direction below which it is found [rad]: σ is off by its square.
+# Turn of a Newton step below which the direction has converged [rad]. The error of σ is of its square.
 _DIRECTION_TOLERANCE = 1.0e-10
 
-# Halvings of a step that does not make σ larger.
+# Largest number of halvings of a step that does not increase σ.
 _STEP_HALVINGS = 12
 
 
 @inlined
 def ellipsoid_matrix(C, dims):
-    """D = C diag(dims²) Cᵀ (00, 01, 02, 11, 12, 22), C from the ellipsoid's frame to the target frame."""
+    """Matrix D = C diag(dims²) Cᵀ of an ellipsoid with semi-axes `dims` [m], as (00, 01, 02, 11, 12, 22).
+
+    C is the rotation matrix from the ellipsoid's frame to the frame of the result.
+    """
     a, b, c = dims[0] * dims[0], dims[1] * dims[1], dims[2] * dims[2]
     return (
         a * C[0] * C[0] + b * C[1] * C[1] + c * C[2] * C[2],
@@ -52,7 +60,10 @@ def ellipsoid_matrix(C, dims):
 
 @inlined
 def ellipsoid_support_point(D, n):
-    """(support s, point of normal n) of an ellipsoid."""
+    """Support function and point of an ellipsoid for the unit vector n: (s(n) [m], point with outward normal n).
+
+    D is the ellipsoid's matrix (`ellipsoid_matrix`). The point is relative to the centre.
+    """
     x = D[0] * n[0] + D[1] * n[1] + D[2] * n[2]
     y = D[1] * n[0] + D[3] * n[1] + D[4] * n[2]
     z = D[2] * n[0] + D[4] * n[1] + D[5] * n[2]
@@ -62,7 +73,10 @@ def ellipsoid_support_point(D, n):
 
 @inlined
 def _support_hessian(D, s, p):
-    """Second derivative of the support function (00, 01, 02, 11, 12, 22)."""
+    """Second derivative of an ellipsoid's support function, as (00, 01, 02, 11, 12, 22).
+
+    D is the ellipsoid's matrix; (s, p) are the results of `ellipsoid_support_point`.
+    """
     return (
         (D[0] - p[0] * p[0]) / s, (D[1] - p[0] * p[1]) / s, (D[2] - p[0] * p[2]) / s,
         (D[3] - p[1] * p[1]) / s, (D[4] - p[1] * p[2]) / s, (D[5] - p[2] * p[2]) / s,
@@ -71,7 +85,11 @@ def _support_hessian(D, s, p):
 
 @inlined
 def support_separation(A, is_block, B, dims, d, n):
-    """Separation σ(n); `B` is the ellipsoid b, `dims` the half edges of the block b."""
+    """Separation σ(n) of an ellipsoid with matrix A from body b, along the unit vector n out of b [m].
+
+    If `is_block`, body b is a block with half edges `dims`, else an ellipsoid with matrix B. d is the vector from the
+    centre of b to that of the ellipsoid.
+    """
     s, _ = ellipsoid_support_point(A, n)
     if is_block:
         return qt.dot(n, d) - s - (dims[0] * abs(n[0]) + dims[1] * abs(n[1]) + dims[2] * abs(n[2]))
@@ -81,19 +99,25 @@ def support_separation(A, is_block, B, dims, d, n):
 
 @inlined
 def _reduced_gradient(free, size):
-    """Reduced gradient in a component with nᵢ = 0, for a half edge `size`; 0 keeps the component there."""
+    """Gradient of σ in a component nᵢ = 0, at a kink of a block with half edge `size` across it.
+
+    `free` is the gradient without the block's term. The result is 0 if n should stay at the kink.
+    """
     return free - math.copysign(size, free) if abs(free) > size else 0.0
 
 
 @inlined
 def _step_to_kink(x, dx, t):
-    """Share t of a step dx at which component x of the direction reaches 0."""
+    """Share of a Newton step at which component x of the direction reaches 0; t if it does not do so before t.
+
+    The whole step changes the component by dx.
+    """
     return min(t, -x / dx) if x * (x + t * dx) < 0.0 else t
 
 
 @inlined
 def _step_component(x, dx, t, at_kink):
-    """Component x of the direction after t dx; exactly 0 at its kink."""
+    """Component x of the direction after the share t of a step dx; exactly 0 if `at_kink` and the step reaches 0."""
     return 0.0 if at_kink and x * dx < 0.0 and -x / dx <= t else x + t * dx
 
 
@@ -105,7 +129,10 @@ def _unit(x, y, z):
 
 @inlined
 def _newton_direction(H, g, n, k0, k1, k2):
-    """δ of (H + tr(H) n nᵀ) δ = g in the components with k = 1, the others 0; g ⟂ n."""
+    """Solve (H + tr(H) n nᵀ) δ = g for δ, in the components i with kᵢ = 1; the others are 0.
+
+    H is symmetric, as (00, 01, 02, 11, 12, 22), and g ⟂ n. The term with n makes the matrix regular.
+    """
     t = H[0] + H[3] + H[5]
     a = k0 * (H[0] + t * n[0] * n[0]) + (1.0 - k0)
     b = k0 * k1 * (H[1] + t * n[0] * n[1])
@@ -125,7 +152,11 @@ def _newton_direction(H, g, n, k0, k1, k2):
 
 @inlined
 def _search_along(A, is_block, B, dims, d, n, e, best):
-    """Line search from n along e for a σ above `best`, halving the step: (found, direction, σ there)."""
+    """Search from direction n along the step e for a separation above `best`: (found, direction, its separation).
+
+    The step is halved until it succeeds, `_STEP_HALVINGS` times at most. For A, B, `is_block`, `dims` and d see
+    `support_separation`.
+    """
     t = 1.0
     if is_block:
         t = _step_to_kink(n[0], e[0], _step_to_kink(n[1], e[1], _step_to_kink(n[2], e[2], t)))
@@ -145,16 +176,20 @@ def _search_along(A, is_block, B, dims, d, n, e, best):
 
 @kernel
 def max_separation_direction(A, is_block, B, dims, d, n):
-    """(unit vector of the largest σ found from n on, σ there).
+    """Maximise the separation σ of an ellipsoid a and body b: (unit vector out of b, σ along it [m]).
 
     Parameters
     ----------
-    A, B : tuples of 6 floats
-        `ellipsoid_matrix` the ellipsoids a and b, in the frame of b; B of a block is not read.
+    A : tuple of 6 floats
+        `ellipsoid_matrix` of a in the frame of b.
     is_block : bool
-        Whether b is a block with half edges `dims`.
+        True if b is a block with half edges `dims`, False if it is an ellipsoid.
+    B : tuple of 6 floats
+        `ellipsoid_matrix` of b in its frame; not read if b is a block.
+    dims : tuple of 3 floats
+        Half edges of b [m]; read only if b is a block.
     d : tuple of 3 floats
-        From the centre of b to that of a [m].
+        From the centre of b to that of a, in the frame of b [m].
     n : tuple of 3 floats
         Unit vector to start from, out of b.
     """
@@ -182,7 +217,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
         H = (H[0] + apart, H[1], H[2], H[3] + apart, H[4], H[5] + apart)
         g = (k0 * (g[0] - along * n[0]), k1 * (g[1] - along * n[1]), k2 * (g[2] - along * n[2]))
         e = _newton_direction(H, g, n, k0, k1, k2)
-        if is_block:  # at a kink only the side counts on which the gradient is known
+        if is_block:  # at a kink the step must go to the side for which the gradient was taken; else n stays there
             k0 = 0.0 if n[0] == 0.0 and e[0] * g[0] < 0.0 else k0
             k1 = 0.0 if n[1] == 0.0 and e[1] * g[1] < 0.0 else k1
             k2 = 0.0 if n[2] == 0.0 and e[2] * g[2] < 0.0 else k2
@@ -198,7 +233,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
 
 @inlined
 def center_direction(d):
-    """Direction from the centre of b, the origin, to that of a; any direction if they coincide."""
+    """Unit vector along d, from the centre of b to that of a; (0, 1, 0) if the centres coincide."""
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:
         return (d[0] / size, d[1] / size, d[2] / size)
@@ -207,7 +242,10 @@ def center_direction(d):
 
 @inlined
 def block_support_point(dims, n, near):
-    """Point of a block with normal n that is nearest to `near`, a point in its frame."""
+    """Point with outward normal n of a block with half edges `dims`, in its frame [m].
+
+    If the normal is that of an edge or face, it is the point there that is nearest to the point `near`.
+    """
     return (
         math.copysign(dims[0], n[0]) if n[0] != 0.0 else min(max(near[0], -dims[0]), dims[0]),
         math.copysign(dims[1], n[1]) if n[1] != 0.0 else min(max(near[1], -dims[1]), dims[1]),
@@ -217,7 +255,10 @@ def block_support_point(dims, n, near):
 
 @inlined
 def nearest_on_block(p, d):
-    """(nearest point on the surface of a block, outward normal, distance) for a point p, all in its frame."""
+    """Find the point of a block's surface nearest to a point p: (point, outward unit normal, distance [m]).
+
+    d are the block's half edges, and all vectors are in its frame. The distance is negative for p inside.
+    """
     q = (min(max(p[0], -d[0]), d[0]), min(max(p[1], -d[1]), d[1]), min(max(p[2], -d[2]), d[2]))
     w = subtract(p, q)
     size = math.sqrt(qt.dot(w, w))
@@ -236,7 +277,7 @@ def nearest_on_block(p, d):
 
 @inlined
 def relative_rotation(R, S):
-    """Rᵀ S: from the frame of S to that of R."""
+    """Rotation matrix Rᵀ S from the frame of S to that of R, for rotation matrices R and S to the world frame."""
     x = qt.transposed_matvec(R, (S[0], S[3], S[6]))
     y = qt.transposed_matvec(R, (S[1], S[4], S[7]))
     z = qt.transposed_matvec(R, (S[2], S[5], S[8]))
@@ -245,7 +286,10 @@ def relative_rotation(R, S):
 
 @kernel
 def collide_ellipsoid(a, b, margin, h, many):
-    """Add the contact of an ellipsoid and any body, in either order, in the frame of the other body."""
+    """Add the contact of an ellipsoid and an ellipsoid, sphere or block if their gap is at most `margin` [m].
+
+    a and b are the two bodies in either order; h is the length of the stage [s].
+    """
     first, second = a, b
     if many.bodies.body[a].shape != ELLIPSOID:
         first, second = b, a

@@ -1,8 +1,10 @@
 """Distance of two convex bodies in any poses, by Gilbert, Johnson and Keerthi's algorithm on support functions.
 
-The differences of points of the two fill a convex body A - B; its point v nearest to the origin is sought. Each round
-adds its corner w farthest against v to a simplex and takes the point of that nearest to the origin. Along n = v/|v| the
-two are apart by n·w at least, and by |v| at most. A sphere takes part as its centre, so that its distance is exact.
+The differences of points of body a and body b fill a convex body, the Minkowski difference A - B. Its point v nearest
+to the origin is the shortest vector between the bodies. Each iteration finds w, the point of A - B farthest along -v.
+It adds w to a simplex and replaces v by the simplex's point nearest to the origin. The distance is between the bound
+v·w/|v| and |v|. A sphere is replaced by its centre, and its radius is subtracted at the end, so that its distance is
+exact.
 
 Reference: E. G. Gilbert, D. W. Johnson, S. S. Keerthi, *A fast procedure for computing the distance between complex
 objects in three-dimensional space*, IEEE J. Robotics and Automation 4, 1988.
@@ -19,16 +21,16 @@ from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, s
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, LAST_CORNER
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
 
-# Rounds at most; polyhedra take some five, round bodies that nearly touch some twenty.
+# Largest number of iterations; polyhedra take about five, round bodies that nearly touch about twenty.
 _MAX_ITERATIONS = 64
 
-# Share of the distance that the bound along n may fall short of it.
+# Largest relative difference between the distance and its lower bound.
 _GAP_TOLERANCE = 0.1
 
 
 @kernel
 def hull_support_vertex(b, k, many):
-    """Corner of hull b that reaches farthest along k, both in its frame [m]."""
+    """Corner of hull b that reaches farthest along the vector k; both in the body frame [m]."""
     best, first = -math.inf, many.narrowphase.hulls.of[b, FIRST_CORNER]
     far = first
     for i in range(first, many.narrowphase.hulls.of[b, LAST_CORNER]):
@@ -40,9 +42,10 @@ def hull_support_vertex(b, k, many):
 
 @inlined
 def support_point(b, x, R, k, thinner, hulls, many):
-    """Farthest point of body b along k, a unit vector, for its geometric centre at x and rotation R [m].
+    """Point of body b that reaches farthest along the unit vector k, world axes [m].
 
-    The body is taken thinner by `thinner` [m] on all sides.
+    x is the geometric centre of the body, R its rotation matrix, and `thinner` the depth by which the body is shrunk on
+    all sides [m]. `hulls` is None if the scene has no hulls.
     """
     d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
@@ -63,7 +66,10 @@ def support_point(b, x, R, k, thinner, hulls, many):
 
 @inlined
 def _core_point(b, x, R, k, thinner, hulls, many):
-    """`support_point` of the core of body b: the centre of a sphere, any other body itself; k of any length."""
+    """Farthest point along k of the core of body b: the centre x of a sphere, else its `support_point`.
+
+    The vector k may have any length here. For R, `thinner` and `hulls` see `support_point`.
+    """
     if many.bodies.body[b].shape == SPHERE:
         return x
     return support_point(b, x, R, k, thinner, hulls, many)
@@ -71,7 +77,11 @@ def _core_point(b, x, R, k, thinner, hulls, many):
 
 @inlined
 def _difference_point(a, b, poses, v, thinner, hulls, many):
-    """Farthest corner of A - B against v, for the poses of both."""
+    """Point of the Minkowski difference A - B that reaches farthest along -v, from the cores of bodies a and b.
+
+    `poses` has (geometric centre, rotation matrix) of a and of b. The core of a sphere is its centre, that of another
+    body the body shrunk by `thinner` [m]. `hulls` is None if the scene has no hulls.
+    """
     one, other = poses
     x, y = subtract(one[0], other[0]), (0.0, 0.0, 0.0)
     return subtract(
@@ -82,10 +92,11 @@ def _difference_point(a, b, poses, v, thinner, hulls, many):
 
 @kernel
 def closest_on_simplex(count, many):
-    """Point nearest the origin of a simplex: the first `count` corners in `narrowphase.simplex` and the next one.
+    """Find the point of a simplex nearest to the origin: (point, number of corners that are kept).
 
-    Only the corners that form the point stay: (point, their number). The new corner is one of them, since the point
-    comes nearer with it than without. (0, 0, 0) inside a tetrahedron.
+    The simplex has `count` corners in `many.narrowphase.simplex`, and a new one after them. Corners that are not needed
+    to form the point are removed; the new one always is needed. If a tetrahedron holds the origin, the point is (0, 0,
+    0).
     """
     S = many.narrowphase.simplex
     w = row_vector(S, count, 0)
@@ -132,26 +143,35 @@ def closest_on_simplex(count, many):
 
 @inlined
 def _core_radius(b, thinner, many):
-    """Radius around the core of body b [m]: a sphere's own, 0 of other shapes."""
+    """Radius that is added to the core of body b [m]: that of a sphere shrunk by `thinner`, 0 for other shapes."""
     return many.bodies.body[b].dims[0] - thinner if many.bodies.body[b].shape == SPHERE else 0.0
 
 
 @kernel
 def gjk_distance(a, b, now, later, way, touch, thinner, hulls, many):
-    """Distance of body a from body b in their poses, or a close bound: (direction out of b, distance).
+    """Distance of body a from body b in given poses: (unit vector out of b, lower bound of the distance [m]).
+
+    The search stops when the bound is at least 0.9 of the distance. It returns 0 if the distance is at most `touch`.
 
     Parameters
     ----------
+    a, b : int
+        Bodies, of which shapes and dimensions are read.
     now : pair of tuples
-        Geometric centre (3 floats) [m] and rotation (9 floats) of a, and of b.
+        Geometric centre (3 floats) [m] and rotation matrix (9 floats) of a, and of b.
     later : pair of tuples or None
-        Other poses of both: the distance is then that of the convex hull of A - B in both.
+        Second poses of both bodies. If given, the result is the distance from the origin to the convex hull of A - B in
+        both poses.
     way : tuple of 3 floats
-        Where to look first, not 0.
+        Direction to start from, out of b; not 0.
     touch : float
-        Distance below which no more is asked [m]: 0 is returned then.
+        Distance at and below which the bodies count as touching [m].
     thinner : float
-        By how much both bodies are taken thinner on all sides [m].
+        Depth by which both bodies are shrunk on all sides [m].
+    hulls : bool or None
+        None if the scene has no hulls.
+    many : BodiesWorkspace
+        Workspace of the world.
     """
     v, count, core = way, 0, _core_radius(a, thinner, many) + _core_radius(b, thinner, many)
     best, n = -math.inf, way

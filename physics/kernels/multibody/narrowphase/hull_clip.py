@@ -1,4 +1,8 @@
-"""Clip the face of a convex polyhedron that is opposite to a face of another by the sides of that face.
+"""Clip the incident face of a convex polyhedron by the sides of the reference face of another one.
+
+The reference face is the one whose normal separates the bodies; the incident face is that of the other body opposite to
+it. The polygon `hulls.polygon` exists in two copies; a clip reads one and writes the other. For every vertex
+`hulls.sides` has the edges into and out of it. Bodies have the numbers 0 and 1 in the pair (`hull_pose`).
 
 References
 ----------
@@ -15,13 +19,16 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_CORNER, LAST_FACE
 
-# An edge of the clipped polygon from this number on is a side of the face that clips it; below, an edge of its own.
+# Edges of the polygon: from this number on they are sides of the reference face, below it edges of the incident face.
 CLIP_SIDE_OFFSET = 64
 
 
 @inlined
 def _side_plane(which, ring, k, first, last, out, hulls):
-    """(outward unit normal, bound) of the plane through side k of a face, along its normal `out`."""
+    """Plane through side k of a face and along the face's normal `out`: (outward unit normal m, offset m·x).
+
+    The face belongs to body `which` of the pair; its corners are `ring[first:last]`.
+    """
     p = row_vector(hulls.corner[which], ring[first + k], 0)
     q = row_vector(hulls.corner[which], ring[first + k + 1 if first + k + 1 < last else first], 0)
     m = qt.cross(subtract(q, p), out)
@@ -32,10 +39,12 @@ def _side_plane(which, ring, k, first, last, out, hulls):
 
 @inlined
 def _clip_polygon(source, count, m, bound, side, slop, hulls):
-    """Clip the polygon in copy `source` by m·x <= bound: (its copy, its vertices).
+    """Clip a polygon by m·x <= bound, for a unit vector m: (copy of the result, its number of vertices).
 
-    A vertex outside by at most the slop stays. It would otherwise come and go by rounding where two faces end together.
-    It stands for the crossing of its edge then, which may be far away along an edge that the side hardly cuts.
+    The polygon has `count` vertices in copy `source` of `hulls.polygon`. `side` is the number of the clipping edge. A
+    vertex outside by at most the slop [m] stays, too, since it would otherwise come and go by rounding where two faces
+    end together. It takes the place of the crossing of its edge with the bound, which may be far away if the edge is
+    nearly parallel to it.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf
@@ -62,7 +71,7 @@ def _clip_polygon(source, count, m, bound, side, slop, hulls):
 
 @inlined
 def _has_corner(f, corner, hulls):
-    """True if face f of the tables has this corner."""
+    """True if face f of the tables has this corner, counted from 0 in its polyhedron."""
     for k in range(hulls.loops[f, 0], hulls.loops[f, 1]):
         if hulls.ring[k] == corner:
             return True
@@ -71,10 +80,11 @@ def _has_corner(f, corner, hulls):
 
 @inlined
 def write_hull_incident_face(which, o, out, many):
-    """Write a face of body o, number `which` of the pair, into copy 0; return its vertices.
+    """Write the incident face of body o, number `which` of the pair, as a polygon; return its number of vertices.
 
-    The face is the one most opposite to `out` among the faces with the farthest corner against `out`. The most opposite
-    of all faces need not have that corner.
+    The polygon is copy 0 of `hulls.polygon`. The face is at the corner of o that is farthest against the direction
+    `out`. Among the faces there it is the one whose normal is most opposed to `out`. The most opposed of all faces of o
+    need not have that corner.
     """
     hulls, low, deepest = many.narrowphase.hulls, math.inf, 0
     for k in range(hulls.of[o, LAST_CORNER] - hulls.of[o, FIRST_CORNER]):
@@ -96,7 +106,10 @@ def write_hull_incident_face(which, o, out, many):
 
 @inlined
 def clip_incident_face(which, r, o, face, slop, many):
-    """Clip the face of body o opposite to this one of body r, number `which`, by its sides: (copy, vertices)."""
+    """Clip the incident face of body o by the sides of a face of body r: (copy of the polygon, number of vertices).
+
+    Body r is number `which` of the pair, `face` is counted from 0 in r, and `slop` [m] is as in `_clip_polygon`.
+    """
     hulls = many.narrowphase.hulls
     out = row_vector(hulls.normal[which], face, 0)
     source, count = 0, write_hull_incident_face(1 - which, o, out, many)

@@ -1,4 +1,4 @@
-"""A convex polyhedron and a sphere or an ellipsoid."""
+"""Contacts of a convex polyhedron with a sphere, and with an ellipsoid."""
 
 from __future__ import annotations
 
@@ -38,10 +38,11 @@ _NO_ELLIPSOID = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @inlined
 def nearest_on_hull(b, x, many):
-    """(nearest point of the surface, outward normal, distance) for a point x of body b, number 0 of the pair.
+    """Find the point of a hull's surface nearest to a point x: (point, outward unit normal, distance [m]).
 
-    Inside, the shortest way out is through the nearest face, and the distance is negative. Outside, the nearest point y
-    is on a face that looks towards x: x - y is a combination of the normals that meet there, so at least one of them
+    Hull b is number 0 of the pair, and x is in the coordinates of the pair (`hull_pose`). The distance is negative for
+    x inside, where the shortest way out is through the nearest face. For x outside, the nearest point y is on a face
+    whose plane is below x: x - y is a combination of the normals of the faces that meet at y, so that one of them
     points towards x.
     """
     hulls, best, face = many.narrowphase.hulls, -math.inf, 0
@@ -66,7 +67,10 @@ def nearest_on_hull(b, x, many):
 
 @kernel
 def collide_sphere_hull(a, b, margin, h, many):
-    """Add the contact of a sphere and a hull, in either order."""
+    """Add the contact of a sphere and a hull if their gap is at most `margin` [m].
+
+    a and b are the two bodies in either order; h is the length of the stage [s].
+    """
     ball, hull = a, b
     if many.bodies.body[b].shape == SPHERE:
         ball, hull = b, a
@@ -81,7 +85,11 @@ def collide_sphere_hull(a, b, margin, h, many):
 
 @inlined
 def _separation(hull, A, way, n, many):
-    """σ(n) of an ellipsoid from a hull, number 0 of the pair; see `ellipsoid_distance`."""
+    """Separation σ(n) of an ellipsoid and a hull along the unit vector n [m], as in `ellipsoid_distance`.
+
+    The hull is number 0 of the pair. The ellipsoid has its centre at `way`, in the coordinates of the pair, and the
+    matrix A (`ellipsoid_matrix`).
+    """
     hulls, reach = many.narrowphase.hulls, -math.inf
     for k in range(hulls.of[hull, LAST_CORNER] - hulls.of[hull, FIRST_CORNER]):
         reach = max(reach, qt.dot(n, row_vector(hulls.corner[0], k, 0)))
@@ -90,9 +98,10 @@ def _separation(hull, A, way, n, many):
 
 @inlined
 def _direction_from_edge(e, hull, S, dims, way, many):
-    """Direction of the largest separation of an ellipsoid (attitude S, at `way`) from edge e of a hull.
+    """Unit vector along which an ellipsoid is farthest apart from edge e of a hull, out of the hull.
 
-    That is a block without width and height: `max_separation_direction` in the frame of the edge.
+    The hull is number 0 of the pair. The ellipsoid has rotation matrix S, semi-axes `dims` [m] and its centre at `way`,
+    in the coordinates of the pair. `max_separation_direction` treats the edge as a block without width and height.
     """
     p, d, _, _ = hull_edge(0, hull, e, many)
     half = 0.5 * math.sqrt(qt.dot(d, d))
@@ -110,12 +119,15 @@ def _direction_from_edge(e, hull, S, dims, way, many):
 
 @kernel
 def collide_ellipsoid_hull(a, b, margin, h, many):
-    """Add the contact of an ellipsoid and a hull, in either order.
+    """Add the contact of an ellipsoid and a hull if their gap is at most `margin` [m].
 
-    The direction is that of the largest separation, as in `ellipsoid_distance`. Consider the face farthest from the
-    ellipsoid, and the ellipsoid's point over it. If this point is above the face, it is the nearest; if not, the
-    nearest point of the hull is on an edge. All directions found are measured against the whole hull, and the best is
-    taken. If the two are apart this is the right one. If they overlap, edges may fail, and a face is the way out.
+    a and b are the two bodies in either order; h is the length of the stage [s].
+
+    The contact normal is the direction of the largest separation, as in `ellipsoid_distance`. The first candidate is
+    the normal of the face farthest from the ellipsoid. If the ellipsoid's nearest point lies over that face, this is
+    the answer. If not, the nearest point of the hull is on an edge, and every edge gives a candidate. All candidates
+    are measured against the whole hull, and the largest separation wins. If the bodies overlap, the edges may give no
+    useful candidate, and the face is the way out.
     """
     round_, hull = a, b
     if many.bodies.body[b].shape == ELLIPSOID:

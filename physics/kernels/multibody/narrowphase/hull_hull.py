@@ -1,8 +1,9 @@
-"""Two convex polyhedra: separating axes, then the clipped face or the nearest points of two edges.
+"""Contacts of two convex polyhedra: separating axis test, then the clipped face or nearest points of two edges.
 
-What `box_box` does for two blocks, for polygons. A plane that separates them best is parallel to a face of one, or
-to an edge of each. Of two edges only those count whose arcs on the sphere of normals cross, one of them turned round:
-the others are no face of the difference of the two [1].
+As in `box_box`, but for any polygons. The plane that separates two polyhedra best is parallel to a face of one of them,
+or to an edge of each. The arc of an edge joins the normals of its two faces on the unit sphere. A pair of edges counts
+only if the arc of one crosses the reversed arc of the other. Other pairs do not form a face of the Minkowski difference
+[1]_.
 
 References
 ----------
@@ -37,17 +38,17 @@ from physics.kernels.multibody.narrowphase.hull_clip import (
 )
 from physics.kernels.multibody.narrowphase.hull_pose import nearest_on_face, pose_hull
 
-# Names: ((body of the pair, face) * 128 + edge in) * 128 + edge out (see `hull_clip.CLIP_SIDE_OFFSET`); then pairs of
-# edges. A polyhedron of 64 corners has at most 124 faces and 186 edges (Euler's formula).
+# Features of a contact: ((body of the pair, face) * 128 + edge in) * 128 + edge out (see `hull_clip.CLIP_SIDE_OFFSET`);
+# then pairs of edges. A polyhedron of 64 corners has at most 124 faces and 186 edges (Euler's formula).
 _MAX_FACES, _MAX_EDGES = 128, 192
 _FIRST_EDGE_FEATURE = 2 * _MAX_FACES * 4 * CLIP_SIDE_OFFSET * CLIP_SIDE_OFFSET
 
 
 @inlined
 def max_hull_face_separation(which, b, other, far, many):
-    """(separation, face) of the face of body b, number `which` of the pair, that is farthest from the body `other`.
+    """Find the face of body b that is farthest from the body `other`: (separation [m], face).
 
-    The search stops at a face farther than `far`, which is too far already.
+    Body b is number `which` of the pair. The search stops at a face farther than `far` [m].
     """
     hulls, best, face = many.narrowphase.hulls, -math.inf, 0
     count = hulls.of[other, LAST_CORNER] - hulls.of[other, FIRST_CORNER]
@@ -64,7 +65,10 @@ def max_hull_face_separation(which, b, other, far, many):
 
 @inlined
 def hull_edge(which, b, e, many):
-    """(begin, direction, normal on the left, on the right) of edge e of body b, number `which` of the pair."""
+    """Edge e of body b: (start [m], vector to its end [m], normal of the left face, normal of the right face).
+
+    Body b is number `which` of the pair; results are in the coordinates of the pair (`hull_pose`).
+    """
     hulls, k = many.narrowphase.hulls, many.narrowphase.hulls.of[b, FIRST_EDGE] + e
     p = row_vector(hulls.corner[which], hulls.edges[k, EDGE_START], 0)
     left, right = (
@@ -76,10 +80,12 @@ def hull_edge(which, b, e, many):
 
 @inlined
 def _is_minkowski_face(d, left, right, e, other_left, other_right):
-    """True if the arc between an edge's normals crosses the arc between the opposite normals of another edge.
+    """True if two edges form a face of the Minkowski difference of their bodies.
 
-    The arc's great circle is perpendicular to the edge. So the arcs cross if the ends of each lie on both sides of the
-    other's circle, and on the same hemisphere.
+    d and e are the vectors of the edges; `left`, `right`, `other_left` and `other_right` are the normals of the faces
+    at them. The arc between the first edge's normals must cross the arc between the opposite normals of the other edge.
+    The great circle of an arc is perpendicular to its edge. So the arcs cross if the ends of each lie on both sides of
+    the other's circle, and all on one hemisphere.
     """
     c, f = qt.dot(d, other_left), qt.dot(d, other_right)
     a, b = qt.dot(e, left), qt.dot(e, right)
@@ -88,7 +94,11 @@ def _is_minkowski_face(d, left, right, e, other_left, other_right):
 
 @inlined
 def max_hull_edge_separation(a, b, many):
-    """(separation, edge of a, edge of b) of the two most separating edges; -inf if there are none."""
+    """Find the two edges across which bodies a and b are farthest apart: (separation [m], edge of a, edge of b).
+
+    Body a is number 0 of the pair, b number 1. The separation is -inf if no pair of edges counts
+    (`_is_minkowski_face`).
+    """
     hulls, best, first, second = many.narrowphase.hulls, -math.inf, 0, 0
     inside = row_vector(hulls.centre, 0, 0)
     for i in range(hulls.of[a, LAST_EDGE] - hulls.of[a, FIRST_EDGE]):
@@ -109,7 +119,7 @@ def max_hull_edge_separation(a, b, many):
 
 @inlined
 def _edge_normal(a, b, i, j, many):
-    """Unit vector out of a, across edges i of a and j of b."""
+    """Unit vector across edge i of body a and edge j of body b, out of a."""
     p, d, _, _ = hull_edge(0, a, i, many)
     _, e, _, _ = hull_edge(1, b, j, many)
     n = qt.cross(d, e)
@@ -121,9 +131,11 @@ def _edge_normal(a, b, i, j, many):
 
 @inlined
 def _keep_deepest_vertex(which, r, o, face, many):
-    """Keep only the lowest vertex in copy 0 of the opposite face, moved above this face: (copy, vertices).
+    """Reduce the polygon in copy 0 of `hulls.polygon` to the lowest vertex of the incident face: (copy 0, 1 vertex).
 
-    This serves bodies that are apart sideways as well, since the plane between them still separates them.
+    Body r, number `which` of the pair, has the reference face `face`; body o has the incident face. The vertex is moved
+    over the reference face. This serves bodies that are also apart sideways: the plane of the face still separates
+    them.
     """
     hulls, low = many.narrowphase.hulls, 0
     out = row_vector(hulls.normal[which], face, 0)
@@ -140,7 +152,10 @@ def _keep_deepest_vertex(which, r, o, face, many):
 
 @inlined
 def _clipped_height(which, face, source, count, many):
-    """Height of the lowest vertex of the clipped polygon above a face; inf for an empty polygon."""
+    """Height of the lowest of `count` vertices of `hulls.polygon[source]` above a face [m]; inf if there is none.
+
+    `face` belongs to body `which` of the pair.
+    """
     out, low = row_vector(many.narrowphase.hulls.normal[which], face, 0), math.inf
     for k in range(count):
         low = min(low, qt.dot(out, row_vector(many.narrowphase.hulls.polygon[source], k, 0)))
@@ -149,7 +164,12 @@ def _clipped_height(which, face, source, count, many):
 
 @inlined
 def _add_face_contacts(a, b, which, face, source, count, least, h, many):
-    """Contacts between a face and the clipped face of the other body, lifted until none has a gap < least."""
+    """Add the contacts between `face` and the clipped face of the other body, given as a polygon.
+
+    `face` belongs to body `which` of the pair (0: a, 1: b). The polygon has `count` vertices in copy `source` of
+    `hulls.polygon`. It is lifted along the normal until no contact has a gap below `least` [m]. h is the length of the
+    stage [s].
+    """
     hulls, origin = many.narrowphase.hulls, row_vector(many.bodies.center, a, 0)
     out, offset = row_vector(hulls.normal[which], face, 0), hulls.offset[which, face]
     lift = max(0.0, least - _clipped_height(which, face, source, count, many))
@@ -167,7 +187,10 @@ def _add_face_contacts(a, b, which, face, source, count, least, h, many):
 
 @inlined
 def _add_edge_contact(a, b, i, j, n, gap, h, many):
-    """Add the contact of edges i of a and j of b, n out of a, at their nearest points."""
+    """Add the contact of edge i of body a and edge j of body b at their nearest points, with a given gap [m].
+
+    n is the unit vector across both edges, out of a; h is the length of the stage [s].
+    """
     origin = row_vector(many.bodies.center, a, 0)
     p, d, _, _ = hull_edge(0, a, i, many)
     q, e, _, _ = hull_edge(1, b, j, many)
@@ -185,12 +208,13 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
 def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
 
-    If a face separates the bodies, or nearly does, and a part of the other body is above it, no pair of edges can have
-    a larger distance: that part touches. If edges do have a larger distance, and lie nearly flat on that face, the part
-    above it touches at the edges' distance, unless it is farther away itself.
+    If a face separates the bodies, or nearly so, and a part of the other body is above it, that part touches: no pair
+    of edges can have a larger separation. Else the pair of edges with the largest separation may touch. If the normal
+    of the edges is nearly that of the face, the part above the face touches instead, at the separation of the edges,
+    unless that part is farther away.
 
-    The first body's face is preferred unless the other's separates more by the slop, and a face to edges likewise: a
-    choice between equals must not change with rounding.
+    The face of a is preferred unless that of b separates by a slop more, and a face is preferred to edges likewise: a
+    choice between equals must not change with rounding. h is the length of the stage [s].
     """
     origin, slop = row_vector(many.bodies.center, a, 0), pair_slop(a, b, many)
     pose_hull(0, a, origin, many)

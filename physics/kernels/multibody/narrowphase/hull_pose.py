@@ -1,4 +1,8 @@
-"""Convex polyhedra in the world: a pair of them from `hull_tables`, and nearest points of their faces."""
+"""Pose of a pair of convex polyhedra in the world, and nearest points of their faces.
+
+`hull_tables.Hulls` has tables of all polyhedra in their body frames, and room for a pair of them in world axes. Bodies
+of the pair have the numbers 0 and 1, which functions take as `which`.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +18,7 @@ from physics.kernels.state.layout import BLOCK
 
 @inlined
 def hull_scale(b, many):
-    """Scale of the corners of body b in the tables."""
+    """Scale of the corners of body b in the tables along its axes: half edges of a block, 1 for a hull."""
     d = many.bodies.body[b].dims
     if many.bodies.body[b].shape == BLOCK:
         return (d[0], d[1], d[2])
@@ -23,14 +27,17 @@ def hull_scale(b, many):
 
 @inlined
 def corner_arm(b, k, many):
-    """Corner k of the tables, relative to the position of body b, world frame [m]."""
+    """Corner k of the tables from the geometric centre of body b, world frame [m]."""
     r, s = row_vector(many.narrowphase.hulls.corners, k, 0), hull_scale(b, many)
     return qt.matvec(row_matrix(many.bodies.rotation, b), (s[0] * r[0], s[1] * r[1], s[2] * r[2]))
 
 
 @kernel
 def pose_hull(which, b, origin, many):
-    """Write body b as number `which` of the pair, with `origin` (world frame) as origin."""
+    """Write corners, face normals, face offsets and centre of body b into the pair, as number `which`.
+
+    They are in world axes, relative to the point `origin` (world frame) [m].
+    """
     hulls, R = many.narrowphase.hulls, row_matrix(many.bodies.rotation, b)
     x = subtract(row_vector(many.bodies.center, b, 0), origin)
     put_vector(hulls.centre, which, 0, x)
@@ -53,7 +60,10 @@ def nearest_on_segment(x, p, q):
 
 @kernel
 def is_above_face(which, b, face, x, many):
-    """True if the normal of a face of body b, number `which` of the pair, passes through x, above or below."""
+    """True if the projection of x on the plane of a face of body b lies inside the face.
+
+    Body b is number `which` of the pair; x is in the coordinates of the pair.
+    """
     hulls = many.narrowphase.hulls
     out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
@@ -67,7 +77,7 @@ def is_above_face(which, b, face, x, many):
 
 @kernel
 def nearest_on_face(which, b, face, x, many):
-    """Point of a face of body b, number `which` of the pair, that is nearest to x."""
+    """Point of a face of body b, number `which` of the pair, that is nearest to x; in the coordinates of the pair."""
     hulls = many.narrowphase.hulls
     out, k = row_vector(hulls.normal[which], face, 0), hulls.of[b, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]

@@ -1,4 +1,4 @@
-"""Contacts of a sphere with a sphere and with a block, from the distance of its centre."""
+"""Contacts of a sphere with a sphere and with a block, from the distance of the sphere's centre."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ from physics.kernels.state.layout import BLOCK
 
 @inlined
 def collide_spheres(a, b, margin, h, many):
-    """Add the contact of two spheres."""
+    """Add the contact of spheres a and b to the contact set if their gap is at most `margin` [m].
+
+    h is the length of the stage [s].
+    """
     x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
     ra, rb = many.bodies.body[a].dims[0], many.bodies.body[b].dims[0]
     n = subtract(x, y)
@@ -33,7 +36,10 @@ def collide_spheres(a, b, margin, h, many):
 
 @inlined
 def collide_sphere_block(a, b, margin, h, many):
-    """Add the contact of a sphere and a block, in either order."""
+    """Add the contact of a sphere and a block if their gap is at most `margin` [m]; a and b are these in either order.
+
+    h is the length of the stage [s].
+    """
     ball, brick = a, b
     if many.bodies.body[a].shape == BLOCK:
         ball, brick = b, a

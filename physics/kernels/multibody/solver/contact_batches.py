@@ -1,11 +1,12 @@
-"""Batches of up to four contacts of the same two bodies, a lane each, for methods with a linear system.
+"""Batches of up to four contacts of the same two bodies, for methods with a linear system.
 
-Two blocks touch with a face. All its contacts need the same computation, and their effects on the bodies add up. So
-twists are read once for four contacts, and forces, moments and blocks of the system are summed before anything is
-written. A lane that is left over repeats the last contact, and weighs nothing.
+Two blocks that touch with a face have several contacts. All of them need the same computation, and their effects on the
+bodies add up. So a batch does the computation for its contacts at once, one in each lane of `Lanes`. It reads the
+bodies' twists once, and sums forces, moments and blocks of the system before it writes them. Lanes that are left over
+repeat the last contact with the weight 0.
 
-What is known of contacts is copied here, with the bodies' block of the system, when an island is prepared: field f of a
-batch is `many.newton.lanes[g, 4 f : 4 f + 4]`.
+When an island is prepared, the data of its contacts are copied into the batches. Field f of batch g is
+`many.newton.lanes[g, 4 f : 4 f + 4]`, one number for each contact.
 """
 
 from __future__ import annotations
@@ -29,18 +30,20 @@ from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import find_block_index
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
-# Columns of `many.newton.batch`: first and second body (b < 0: wall), place of their block, whether the first body is
-# eliminated before the second; first contact in `many.islands.contacts`, and how many.
+# Columns of `many.newton.batch`: first and second body (-1 - k: wall k), index of their off-diagonal blocks, 1 if the
+# first body is eliminated before the second; position of the first contact in `many.islands.contacts`, number of
+# contacts.
 BATCH_BODY_A, BATCH_BODY_B, BATCH_BLOCK, BATCH_IS_A_FIRST, BATCH_START, BATCH_COUNT = range(6)
 
-# Fields of a contact: arms from both bodies, frame, target, μ, W_nn and step of its block, 1 or 0 for what it weighs.
+# Fields of a contact: arms from both bodies, frame, target, μ, W_nn, `ContactSet.step`, weight (1, or 0 in a spare
+# lane).
 LANE_ARM, LANE_FRAME, LANE_TARGET, LANE_MU, LANE_W_NN, LANE_STEP, LANE_WEIGHT = 0, 6, 15, 18, 19, 20, 21
 
-# Of `interior_point`: diagonal of S (normal, tangents), p̂, û.
+# Fields of `interior_point`: diagonal of S (normal, tangents), p̂, û.
 IPM_UNIT, IPM_IMPULSE, IPM_VELOCITY = 22, 24, 27
 
-# What `interior_point` needs while it runs: scaling (w, η), λ, 1/√det λ, direction of slip, what û misses, what is
-# added to p̂, changes of both.
+# Fields of one iteration of `interior_point`: scaling (w, η), λ, 1/√det λ, direction of slip, residual of û, corrector,
+# changes W dp̂ and dû.
 (
     IPM_SCALING,
     IPM_LAMBDA,
@@ -52,31 +55,31 @@ IPM_UNIT, IPM_IMPULSE, IPM_VELOCITY = 22, 24, 27
     IPM_VELOCITY_STEP,
 ) = 30, 34, 37, 38, 40, 43, 46, 49
 
-# What `proximal_newton` needs, in the same place: impulses q, the best of them, q - ρ u, p(x).
+# Fields of `proximal_newton`, which share the memory of those above: impulses q, the best of them, q - ρ u, p(x).
 PROX_IMPULSE, PROX_BEST, PROX_ARGUMENT, PROX_PROJECTED = 30, 33, 36, 39
 
 
 @inlined
 def batch_field(g, field, many):
-    """A field of batch g."""
+    """Read a field of batch g: four numbers, one for each contact."""
     return load_lanes(many.newton.lanes, g, LANE_COUNT * field)
 
 
 @inlined
 def put_batch_field(g, field, x, many):
-    """Write a field of batch g."""
+    """Write the four numbers x to a field of batch g."""
     store_lanes(many.newton.lanes, g, LANE_COUNT * field, x)
 
 
 @inlined
 def batch_vector(g, field, many):
-    """Vector of each contact of batch g, from three fields."""
+    """Read a vector of each contact of batch g, from three fields: components of four numbers each."""
     return batch_field(g, field, many), batch_field(g, field + 1, many), batch_field(g, field + 2, many)
 
 
 @inlined
 def put_batch_vector(g, field, a, many):
-    """Write three fields of batch g."""
+    """Write the vector a of each contact, with components of four numbers each, to three fields of batch g."""
     put_batch_field(g, field, a[0], many)
     put_batch_field(g, field + 1, a[1], many)
     put_batch_field(g, field + 2, a[2], many)
@@ -84,7 +87,7 @@ def put_batch_vector(g, field, a, many):
 
 @inlined
 def batch_frames(g, many):
-    """Frames of the contacts of batch g, row by row."""
+    """Contact frames of the contacts of batch g, row by row: nine entries of four numbers each."""
     n, s, t = (
         batch_vector(g, LANE_FRAME, many),
         batch_vector(g, LANE_FRAME + 3, many),
@@ -95,7 +98,7 @@ def batch_frames(g, many):
 
 @inlined
 def _fill_batch(g, i, n, many):
-    """Copy data of the n contacts from place i of the queue on into batch g."""
+    """Copy the data of the n contacts from position i of `many.islands.contacts` on into batch g."""
     L = many.newton.lanes
     for lane in range(LANE_COUNT):
         k = many.islands.contacts[i + min(lane, n - 1)]
@@ -117,7 +120,10 @@ def _fill_batch(g, i, n, many):
 
 @kernel
 def batch_contacts(first, last, many):
-    """Batch the contacts `many.islands.contacts[first:last]` of an ordered island; return whether they fit."""
+    """Sort the contacts `many.islands.contacts[first:last]` of an island into batches; return False if room is short.
+
+    The bodies of the island must be ordered for elimination (`minimum_degree.order_elimination`).
+    """
     count, i = 0, first
     while i < last:
         a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
@@ -149,7 +155,7 @@ def batch_contacts(first, last, many):
 
 @inlined
 def gather_batch(g, rows, many):
-    """Vectors of the contacts of batch g from an array with a row for each contact."""
+    """Read the vectors of the contacts of batch g from an array with a row for each contact of the set."""
     i, n = many.newton.batch[g, BATCH_START], many.newton.batch[g, BATCH_COUNT]
     j, k = many.islands.contacts[i], many.islands.contacts[i + min(1, n - 1)]
     l, m = many.islands.contacts[i + min(2, n - 1)], many.islands.contacts[i + n - 1]
@@ -162,7 +168,7 @@ def gather_batch(g, rows, many):
 
 @inlined
 def scatter_batch(g, a, rows, many):
-    """Write vectors of the contacts of batch g to an array with a row for each contact."""
+    """Write the vectors a of the contacts of batch g to an array with a row for each contact of the set."""
     i, n = many.newton.batch[g, BATCH_START], many.newton.batch[g, BATCH_COUNT]
     for lane in range(n):
         put_vector(rows, many.islands.contacts[i + lane], 0, (a[0][lane], a[1][lane], a[2][lane]))
@@ -170,14 +176,17 @@ def scatter_batch(g, a, rows, many):
 
 @inlined
 def _point_velocity(b, r, t, spin):
-    """v + ω x r of body b for points r."""
+    """Velocities v + ω x r of body b at four points with arms r, from twists t with ω from column `spin` on [m/s]."""
     m = qt.cross(row_vector(t, b, spin), r)
     return (t[b, 0] + m[0], t[b, 1] + m[1], t[b, 2] + m[2])
 
 
 @inlined
 def batch_velocity(g, t, spin, many):
-    """Relative velocities of the contacts of batch g in their frames for twists t, ω from column `spin` [m/s]."""
+    """Relative velocities at the contacts of batch g, in their frames, for the bodies' twists t [m/s].
+
+    In t, ω begins at column `spin`.
+    """
     a, b = many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     u = _point_velocity(a, batch_vector(g, LANE_ARM, many), t, spin)
     if b >= 0:
@@ -188,14 +197,17 @@ def batch_velocity(g, t, spin, many):
 
 @inlined
 def batch_velocity_error(g, many):
-    """Velocities u of the contacts of batch g minus their targets."""
+    """Velocities at the contacts of batch g minus their targets, in their frames [m/s]."""
     u, t = batch_velocity(g, many.bodies.twist, 3, many), batch_vector(g, LANE_TARGET, many)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
 
 @inlined
 def _apply_body_impulse(b, f, m, sign, t, spin, many):
-    """Change the twist of body b in t by an impulse and a moment."""
+    """Change the twist of body b in t, with ω from column `spin` on, by sign times the impulse f and moment m.
+
+    f and m are in the world frame [N s, N m s].
+    """
     w, s = apply_body_inv_inertia(b, m, many), sign * many.bodies.inv_mass[b]
     put_vector(t, b, 0, (t[b, 0] + s * f[0], t[b, 1] + s * f[1], t[b, 2] + s * f[2]))
     put_vector(t, b, spin, (t[b, spin] + sign * w[0], t[b, spin + 1] + sign * w[1], t[b, spin + 2] + sign * w[2]))
@@ -208,7 +220,10 @@ def _sum_lanes(a):
 
 @inlined
 def apply_batch_impulse(g, p, t, spin, many):
-    """Change the twists t of both bodies by impulses of the contacts of batch g, given in their frames [N s]."""
+    """Change the twists t of both bodies of batch g by the contacts' impulses p, given in their frames [N s].
+
+    In t, ω begins at column `spin`.
+    """
     on, a, b = batch_field(g, LANE_WEIGHT, many), many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     p = qt.transposed_matvec(batch_frames(g, many), (on * p[0], on * p[1], on * p[2]))
     f = _sum_lanes(p)
@@ -219,13 +234,13 @@ def apply_batch_impulse(g, p, t, spin, many):
 
 @inlined
 def planar_length(x, y):
-    """√(x² + y²)."""
+    """Length √(x² + y²) of the vectors (x, y)."""
     return lane_sqrt(x * x + y * y)
 
 
 @inlined
 def project_on_disks(x, y, limit):
-    """Vector (x, y), shortened to `limit` if it is longer."""
+    """Vectors (x, y), shortened to the length `limit` if they are longer."""
     size = planar_length(x, y)
     s = select_lanes(size > limit, limit / size, 1.0)
     return s * x, s * y
@@ -233,7 +248,10 @@ def project_on_disks(x, y, limit):
 
 @inlined
 def batch_residuals(g, p, u, many):
-    """Natural-map residuals of the contacts of batch g for impulses p and velocities u; see `contact_operator`."""
+    """Natural-map residuals of the contacts of batch g, for impulses p and velocity errors u [m/s].
+
+    They are those of `contact_operator.natural_map_residual`.
+    """
     step, mu = batch_field(g, LANE_STEP, many), batch_field(g, LANE_MU, many)
     x, y = project_on_disks(p[1] - step * u[1], p[2] - step * u[2], mu * larger(p[0], 0.0))
     tangential = planar_length(p[1] - x, p[2] - y) / step

@@ -1,11 +1,11 @@
 """Response of a world's bodies to impulses at its contacts, and the residual of the contact problem.
 
-The problem and its natural-map residual are those of `physics.kernels.contact_solver.gauss_seidel`; here u is not kept
-per contact through a matrix W, which would be full, but follows from the twists of the bodies,
+The problem and its natural-map residual are those of `physics.kernels.contact_solver.gauss_seidel`. The velocity error
+u of contact k follows from the twists of its bodies a and b, without a Delassus matrix, which would be full:
 
-    u_k = E_k ((v + ω x r)_a - (v + ω x r)_b) - target_k,
+    u_k = E_k ((v + ω x r)_a - (v + ω x r)_b) - target_k.
 
-which an impulse of contact k changes by M⁻¹ Jᵀ.
+E_k is the contact frame and r are the arms. An impulse p of a contact changes the twists by M⁻¹ Jᵀ p.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from physics.kernels.multibody.data.contact_set import add_scaled, contact_veloc
 
 @inlined
 def apply_body_inv_inertia(b, a, many):
-    """I⁻¹ a of body b, world frame."""
+    """Product I⁻¹ a of the inverse inertia of body b and a vector a, world frame."""
     K = many.bodies.inv_inertia
     return qt.symmetric_matvec((K[b, 0], K[b, 1], K[b, 2], K[b, 3], K[b, 4], K[b, 5]), a)
 
 
 @inlined
 def apply_contact_impulse(k, local, t, many):
-    """Change the twists t of both bodies by an impulse of contact k, given in its frame [N s]."""
+    """Change the twists t of both bodies of contact k by an impulse `local`, given in the contact frame [N s]."""
     apply_world_impulse(k, qt.transposed_matvec(row_matrix(many.contacts.frame, k), local), t, many)
 
 
 @inlined
 def apply_world_impulse(k, p, t, many):
-    """Change the twists t of both bodies by an impulse of contact k, given in the world frame [N s]."""
+    """Change the twists t of both bodies of contact k by an impulse p, given in the world frame [N s]."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     put_vector(t, a, 0, add_scaled(row_vector(t, a, 0), many.bodies.inv_mass[a], p))
     put_vector(
@@ -60,7 +60,11 @@ def apply_world_impulse(k, p, t, many):
 
 @inlined
 def _add_mobility(k, b, first, W, many):
-    """Block W plus the mobility of one end: 1/m + (r x e_i)·I⁻¹ (r x e_j); upper triangle."""
+    """Sum of W and the mobility of body b at contact k: 1/m δ_ij + (r x e_i)·I⁻¹ (r x e_j) [1/kg].
+
+    r is the arm of b (its first column is `first`), e_i are the axes of the contact frame. W and the result are the
+    upper triangle (00, 01, 02, 11, 12, 22) of a symmetric matrix.
+    """
     r, E = row_vector(many.contacts.arm, k, first), many.contacts.frame
     g0, g1, g2 = qt.cross(r, row_vector(E, k, 0)), qt.cross(r, row_vector(E, k, 3)), qt.cross(r, row_vector(E, k, 6))
     h0, h1, h2 = (
@@ -77,9 +81,10 @@ def _add_mobility(k, b, first, W, many):
 
 @kernel
 def assemble_contact_blocks(n, many):
-    """Write every contact's own block; return the scale. The twists then include the warm start's impulses.
+    """Write the diagonal Delassus block of each of the n contacts, and apply the warm start; return the scale [m/s].
 
-    The scale is the largest velocity that a contact would have without any impulse [m/s].
+    The scale is the largest velocity error of a contact without any impulse. The impulses of the warm start are then
+    added to the twists.
     """
     scale = 0.0
     for k in range(n):
@@ -102,14 +107,14 @@ def assemble_contact_blocks(n, many):
 
 @inlined
 def velocity_error(k, many):
-    """Velocity u of contact k minus its target."""
+    """Velocity of contact k minus its target, in the contact frame: (normal, two tangents) [m/s]."""
     u, t = contact_velocity(k, many), row_vector(many.contacts.target, k, 0)
     return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
 
 
 @inlined
 def project_on_disk(x, y, limit):
-    """Vector (x, y), shortened to `limit` if it is longer."""
+    """Vector (x, y), shortened to the length `limit` if it is longer."""
     size = math.sqrt(x * x + y * y)
     if size > limit:
         return x * (limit / size), y * (limit / size)
@@ -118,7 +123,11 @@ def project_on_disk(x, y, limit):
 
 @inlined
 def natural_map_residual(p, u, normal, step, mu):
-    """Natural-map residual of one contact [m/s] (`contact_solver.gauss_seidel`); `normal` is W_nn, `step` 1/λ_max."""
+    """Natural-map residual of one contact with impulse p and velocity error u, in the contact frame [m/s].
+
+    `normal` is the entry W_nn of the contact's Delassus block, `step` is 1/λ_max of the block's tangential part, and
+    `mu` the friction coefficient. See `contact_solver.gauss_seidel`.
+    """
     x, y = project_on_disk(p[1] - step * u[1], p[2] - step * u[2], mu * max(p[0], 0.0))
     dx, dy = p[1] - x, p[2] - y
     return max(abs(min(u[0], p[0] * normal)), math.sqrt(dx * dx + dy * dy) / step)
@@ -143,7 +152,10 @@ def contact_residual(k, many):
 
 @kernel
 def max_contact_residual(first, last, friction, many):
-    """Largest natural-map residual of the contacts `many.islands.contacts[first:last]` at their impulses [m/s]."""
+    """Largest natural-map residual of the contacts `many.islands.contacts[first:last]` at their impulses [m/s].
+
+    `friction` is None if the scene has no friction; only normal impulses count then.
+    """
     worst = 0.0
     for i in range(first, last):
         k = many.islands.contacts[i]
@@ -151,6 +163,6 @@ def max_contact_residual(first, last, friction, many):
             miss = _normal_map(many.contacts.impulse[k, 0], velocity_error(k, many)[0], many.contacts.block[k, 0])
         else:
             miss = contact_residual(k, many)
-        if not miss <= worst:  # also what is not a number
+        if not miss <= worst:  # also true for NaN
             worst = miss
     return worst

@@ -1,11 +1,12 @@
-"""Contacts for sweeps: one row has all data of a visit, in the order of the visits.
+"""Contact rows for sweeps: all data of one visit side by side, in the order of the visits.
 
-A visit of one contact asks for some forty numbers and changes two bodies. For the frame E, the arms r, s from the
-bodies a, b, and impulses p in the frame,
+A visit solves one contact alone. It reads some forty numbers and changes the motion of two bodies a and b. For the
+contact frame E, the arms r and s from the bodies, and the impulse p in the frame,
 
-    u = E (v_a + ω_a x r - v_b - ω_b x s),
+    u = E (v_a + ω_a x r - v_b - ω_b x s).
 
-and v_a changes by f/m_a with f = Eᵀ p, ω_a by I_a⁻¹ (r x f), those of b by as much the other way.
+With f = Eᵀ p the impulse changes v_a by f/m_a and ω_a by I_a⁻¹ (r x f). It changes v_b by -f/m_b and ω_b by
+-I_b⁻¹ (s x f).
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, r
 from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
-# Columns of `many.sweeps.visit_rows`: frame, arms of both bodies, block and its inverse (00, 01, 02, 11, 12, 22),
-# target, μ, λ_max of its tangential part, impulse.
+# Columns of `many.sweeps.visit_rows`: frame (from column 0 on), arms of both bodies, Delassus block and its inverse
+# (00, 01, 02, 11, 12, 22), target, μ, λ_max of the block's tangential part, impulse.
 VISIT_ARM_A, VISIT_ARM_B, VISIT_BLOCK, VISIT_INVERSE, VISIT_TARGET, VISIT_MU, VISIT_LAMBDA_MAX, VISIT_IMPULSE = (
     9,
     12,
@@ -30,13 +31,13 @@ VISIT_ARM_A, VISIT_ARM_B, VISIT_BLOCK, VISIT_INVERSE, VISIT_TARGET, VISIT_MU, VI
     32,
 )
 
-# First number of an inverse that has not been needed yet: that of any block is positive.
+# First number of an inverse that is not computed yet; that of any computed inverse is positive.
 NOT_INVERTED = 0.0
 
 
 @inlined
 def _write_visit(i, k, many):
-    """Write contact k as visit i."""
+    """Write the contact row of visit i for contact k."""
     R, B = many.sweeps.visit_rows, many.contacts.block
     for c in range(9):
         R[i, c] = many.contacts.frame[k, c]
@@ -56,14 +57,14 @@ def _write_visit(i, k, many):
 
 @inlined
 def write_visits(first, last, many):
-    """Write the contacts `many.islands.contacts[first:last]` as visits 0, 1, 2 ..."""
+    """Write the contact rows of `many.islands.contacts[first:last]`, for visits 0, 1, 2 and so on."""
     for i in range(first, last):
         _write_visit(i - first, many.islands.contacts[i], many)
 
 
 @inlined
 def read_visit_impulses(first, last, many):
-    """Copy impulses of the contacts `many.islands.contacts[first:last]` from their visits."""
+    """Copy the impulses in the contact rows back to the contacts `many.islands.contacts[first:last]`."""
     for i in range(first, last):
         put_vector(
             many.contacts.impulse,
@@ -75,14 +76,14 @@ def read_visit_impulses(first, last, many):
 
 @inlined
 def visit_block(i, first, many):
-    """Six numbers of visit i: a symmetric matrix."""
+    """Read six numbers of visit i from column `first` on: a symmetric matrix (00, 01, 02, 11, 12, 22)."""
     R = many.sweeps.visit_rows
     return (R[i, first], R[i, first + 1], R[i, first + 2], R[i, first + 3], R[i, first + 4], R[i, first + 5])
 
 
 @inlined
 def write_block_inverse(i, W, many):
-    """Write the inverse of the contact's own block W (upper triangle)."""
+    """Write the inverse of W, the Delassus block of visit i as (00, 01, 02, 11, 12, 22), into its contact row."""
     x, y, z = W[3] * W[5] - W[4] * W[4], W[2] * W[4] - W[1] * W[5], W[1] * W[4] - W[2] * W[3]
     s = 1.0 / (W[0] * x + W[1] * y + W[2] * z)
     put_vector(many.sweeps.visit_rows, i, VISIT_INVERSE, (s * x, s * y, s * z))
@@ -92,7 +93,7 @@ def write_block_inverse(i, W, many):
 
 @inlined
 def visit_velocity_error(i, many):
-    """Velocity u of visit i minus its target."""
+    """Velocity u of visit i minus its target, in the contact frame [m/s]."""
     t, a, b = many.sweeps.motion, many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1]
     v = add_scaled(
         row_vector(t, a, 0),
@@ -115,7 +116,7 @@ def visit_velocity_error(i, many):
 
 @inlined
 def _apply_body_impulse(b, s, f, arm, many):
-    """Change the motion of body b by an impulse s f (world frame) at `arm`."""
+    """Change the motion of body b by an impulse s f (world frame) at the end of its `arm`."""
     t = many.sweeps.motion
     put_vector(t, b, 0, add_scaled(row_vector(t, b, 0), s * many.bodies.inv_mass[b], f))
     put_vector(
@@ -128,7 +129,7 @@ def _apply_body_impulse(b, s, f, arm, many):
 
 @inlined
 def apply_visit_impulse(i, p, many):
-    """Change the motion of both bodies of visit i by an impulse p, given in the contact's frame [N s]."""
+    """Change the motion of both bodies of visit i by an impulse p, given in the contact frame [N s]."""
     f = qt.transposed_matvec(row_matrix(many.sweeps.visit_rows, i), p)
     _apply_body_impulse(
         many.sweeps.visit_bodies[i, 0], 1.0, f, row_vector(many.sweeps.visit_rows, i, VISIT_ARM_A), many

@@ -1,11 +1,13 @@
-"""Sweeps over all contacts of a world with the circular Coulomb cone, on the twists of bodies (`contact_operator`).
+"""Sweeps over the contacts of an island with the circular Coulomb cone (block Gauss-Seidel on twists).
 
-A visit of one contact answers it alone (`one_contact.solve_contact_block`), and sweeps go up and down the list in
-turns, so that loads travel through a stack in both senses.
+A visit solves one contact alone (`one_contact.solve_contact_block`) while all other impulses stay. Sweeps go up and
+down the list in turns, so that loads travel through a stack in both directions.
 
-Most contacts are soon answered and stay so: where something lands on a pile, few others have anything to do. A contact
-is visited only if one of its bodies has been pushed since, and it is left as it is where it is off by less than the
-tolerance. The returned impulses are checked whole.
+Most contacts are soon solved and stay so: where a body lands on a pile, few contacts change. So a contact is visited
+only if one of its bodies has been pushed since its last visit. It is left as it is if its error is below the tolerance.
+The residual of the returned impulses is checked for all contacts.
+
+A motion of bodies is their twist in `many.sweeps.motion`. Visits are numbered from 1 on.
 """
 
 from __future__ import annotations
@@ -42,32 +44,33 @@ from physics.kernels.multibody.solver.normal_rows import (
     twists_from_motion,
 )
 
-# Share of the tolerance to which one contact is answered, and within which it is left as it is, each that is
-# answered leaving those of two bodies to be visited again; and the same without friction.
+# Share of the goal within which a contact is left as it is, with friction and without. Each correction makes the
+# contacts of two bodies due for another visit.
 _SKIP_SHARE = 0.9
 _NORMAL_SKIP_SHARE = 0.1
 
-# Of a contact that has been seen to miss too much: it is visited and answered whatever its bodies did.
+# Number of the last visit of a contact whose residual is too large: it is visited and corrected in any case.
 _MUST_VISIT = -1
 
-# Goings through the list for each sweep allowed, at most: with little to visit they cost little, but not nothing.
+# Largest number of passes through the list, per allowed sweep. A pass with few visits costs little, but not nothing.
 _PASSES_PER_SWEEP = 10
 
-# Half of the sweeps between two extrapolations, an even number: those up and down belong together. Slow sweeps contract
-# along one direction with a ratio q near 1, which two changes tell; the rest of that series, q/(1 - q) times the last
-# change, is added at once. See `physics.kernels.contact_solver.gauss_seidel`. (Two more sweeps between them save a
-# tenth of the visits where the tolerance is loose, and leave arches at their limit unsolved five times as often at
-# `precise`.) There is no extrapolation if so few sweeps are allowed: the small rest is no series.
+# Half of the number of sweeps between two extrapolations; even, since a sweep up and a sweep down belong together. Slow
+# sweeps contract the error along one direction by a ratio q near 1 per period, which follows from two changes. The rest
+# of the series, q/(1 - q) times the last change, is then added at once (`physics.kernels.contact_solver.gauss_seidel`).
+# With two more sweeps between extrapolations, a tenth of the visits is saved at loose tolerances, but arches at their
+# limit stay unsolved five times as often at `precise`. If fewer sweeps are allowed than a period has, there is no
+# extrapolation.
 _HALF_PERIOD = 2
 _MAX_CONTRACTION_RATIO = 0.998
 
-# Of impulses that are not kept: no visit has a number as low.
+# Mark of a moment without stored impulses: less than the number of any visit.
 _NO_HISTORY = -2
 
 
 @inlined
 def _is_up_to_date(i, a, b, many):
-    """True if neither of two bodies (b < 0: a wall) has been pushed since visit i."""
+    """True if neither body a nor body b (b < 0: a wall) has been pushed since the last visit of their contact i."""
     return many.sweeps.visited[i] >= many.sweeps.pushed[a] and (
         b < 0 or many.sweeps.visited[i] >= many.sweeps.pushed[b]
     )
@@ -81,7 +84,7 @@ def is_contact_up_to_date(k, many):
 
 @inlined
 def _mark_pushed(a, b, visit, many):
-    """Note that two bodies (b < 0: a wall) have been pushed in this visit."""
+    """Record that bodies a and b (b < 0: a wall) have been pushed in the visit with this number."""
     many.sweeps.pushed[a] = visit
     if b >= 0:
         many.sweeps.pushed[b] = visit
@@ -89,9 +92,9 @@ def _mark_pushed(a, b, visit, many):
 
 @inlined
 def relax_normal_impulse(k, visit, small, many):
-    """Correct contact k along its normal if its error exceeds `small`; return the error before, as a velocity [m/s].
+    """Correct contact k along its normal if its error exceeds `small`; return the error before [m/s].
 
-    `visit` is the number of this visit.
+    The error is that of the impulse, as a velocity. `visit` is the number of this visit.
     """
     many.sweeps.visited[k] = visit
     p, normal = many.contacts.impulse[k, 0], many.contacts.block[k, 0]
@@ -106,10 +109,10 @@ def relax_normal_impulse(k, visit, small, many):
 
 @kernel
 def sweep_normals(first, last, residual, goal, limit, many):
-    """`sweep_contacts` without friction: impulses along the normals only.
+    """Do `sweep_contacts` without friction: improve the impulses along the normals only.
 
     A corrected contact is skipped until one of its bodies has been pushed again. A contact whose error is a small share
-    of the goal is not corrected. So small problems visit few contacts.
+    of the goal is not corrected. So easy problems need few visits.
     """
     sweeps = visits = 0
     for i in range(first, last):
@@ -131,13 +134,18 @@ def sweep_normals(first, last, residual, goal, limit, many):
             twists_from_motion(first, last, many)
             residual = max_contact_residual(first, last, None, many)
         if visits == before:
-            break  # all are answered, and stay so
+            break  # all contacts are solved, and no body moves any more
     return sweeps, residual
 
 
 @inlined
 def _solve_one_contact(W, V, mu, step, p, u, goal):
-    """Impulse of a contact that answers its own velocity u, others fixed; W and its inverse V are symmetric."""
+    """New impulse of one contact that solves it while all other impulses stay.
+
+    p is its present impulse and u its velocity error at p. W is the contact's Delassus block and V its inverse, as (00,
+    01, 02, 11, 12, 22). `mu` is the friction coefficient, `step` is 1/λ_max of the tangential part of W, and `goal` the
+    allowed residual [m/s].
+    """
     own = qt.symmetric_matvec(W, p)
     b = subtract(u, own)
     if b[0] >= 0.0:
@@ -151,7 +159,7 @@ def _solve_one_contact(W, V, mu, step, p, u, goal):
     what, q, _ = solve_contact_block(full, b, mu, W[3] + W[5], goal, x, y, False)
     if what != CONTACT_UNSOLVED:
         return q
-    # The normal impulse first, then the tangential step, back on the disk.
+    # Fallback: the normal impulse first, then a tangential step, projected on the disk of the friction cone.
     normal = max(0.0, p[0] - u[0] / W[0])
     d = normal - p[0]
     x, y = project_on_disk(p[1] - step * (u[1] + W[1] * d), p[2] - step * (u[2] + W[2] * d), mu * normal)
@@ -160,7 +168,10 @@ def _solve_one_contact(W, V, mu, step, p, u, goal):
 
 @inlined
 def _as_velocity(i, d, many):
-    """Change d of an impulse, as a velocity [m/s]."""
+    """Size of a change d of the impulse in row i, as the velocity that it would cause alone [m/s].
+
+    The normal part is multiplied by W_nn, the tangential part by λ_max.
+    """
     return max(
         abs(d[0]) * many.sweeps.visit_rows[i, VISIT_BLOCK],
         max(abs(d[1]), abs(d[2])) * many.sweeps.visit_rows[i, VISIT_LAMBDA_MAX],
@@ -169,7 +180,10 @@ def _as_velocity(i, d, many):
 
 @inlined
 def _save_history(i, p, marks, many):
-    """Store the impulse of visit i at two moments, if it has not been visited since."""
+    """Store the impulse p of contact row i as its value at two earlier moments, if it has not changed since.
+
+    `marks` are the numbers of the last visits before the two moments.
+    """
     if many.sweeps.visited[i] <= marks[0]:
         put_vector(many.sweeps.impulse_4_sweeps_ago, i, 0, p)
     if many.sweeps.visited[i] <= marks[1]:
@@ -178,9 +192,10 @@ def _save_history(i, p, marks, many):
 
 @inlined
 def _relax_contact(i, number, marks, small, many):
-    """Correct visit i if its error exceeds `small`, or is flagged to; return the error before [m/s].
+    """Correct contact row i if its error exceeds `small`, or if it is flagged; return the error before [m/s].
 
-    The error is a velocity, the contact's residual or a little more. `number` is that of this visit.
+    The error is a velocity: the contact's residual or a little more. `number` is the number of this visit; `marks` are
+    as in `_save_history`.
     """
     W, p = visit_block(i, VISIT_BLOCK, many), row_vector(many.sweeps.visit_rows, i, VISIT_IMPULSE)
     _save_history(i, p, marks, many)
@@ -209,7 +224,10 @@ def _relax_contact(i, number, marks, small, many):
 
 @inlined
 def _contraction_ratio(count, marks, many):
-    """Ratio of the impulses' last change to the one before, in the metric of W_nn; 0 if they are not parallel."""
+    """Ratio of the impulses' last change to the change before, weighted with W_nn; 0 if the two are not parallel.
+
+    The changes are those between the two moments of `marks` and the present. `count` is the number of contacts.
+    """
     product = square = 0.0
     for i in range(count):
         if many.sweeps.visited[i] <= marks[0]:
@@ -224,9 +242,11 @@ def _contraction_ratio(count, marks, many):
 
 @inlined
 def _extrapolate(count, ratio, number, marks, small, many):
-    """Add the rest of the series of their last change to the impulses, and project them into the cones.
+    """Continue the last change of the impulses as a geometric series with this ratio, and add the rest of the series.
 
-    The motion of the bodies is updated, too.
+    The impulses are projected into their cones, and the motion of the bodies is updated. Bodies at contacts whose
+    impulses change by more than `small` [m/s] are marked as pushed in the visit `number`. `count` and `marks` are as in
+    `_contraction_ratio`.
     """
     s = ratio / (1.0 - ratio)
     for i in range(count):
@@ -245,7 +265,10 @@ def _extrapolate(count, ratio, number, marks, small, many):
 
 @inlined
 def _flag_unsolved(count, small, many):
-    """Flag contacts whose error exceeds `small`, others once a body of theirs moves; return the residual [m/s]."""
+    """Flag the contacts with a residual above `small` [m/s] for a visit; return the largest residual [m/s].
+
+    Other contacts, of the first `count` rows, are visited once one of their bodies is pushed.
+    """
     worst = 0.0
     for i in range(count):
         R = many.sweeps.visit_rows
@@ -258,14 +281,18 @@ def _flag_unsolved(count, small, many):
         )
         many.sweeps.visited[i] = 0 if miss <= small else _MUST_VISIT
         _mark_pushed(many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], 0, many)
-        if not miss <= worst:  # also what is not a number
+        if not miss <= worst:  # also true for NaN
             worst = miss
     return worst
 
 
 @kernel
 def _sweep(count, is_up, visits, marks, small, many):
-    """Sweep once over the flagged contacts: (largest error of an impulse [m/s], visits so far)."""
+    """Sweep once over the first `count` contact rows: (largest error [m/s], visits so far).
+
+    The sweep goes up the rows if `is_up`, else down, and skips rows that need no visit. `marks` and `small` are as in
+    `_relax_contact`.
+    """
     worst = 0.0
     for j in range(count):
         i = j if is_up else count - 1 - j
@@ -277,7 +304,10 @@ def _sweep(count, is_up, visits, marks, small, many):
 
 @kernel
 def _sweep_until_solved(count, residual, goal, limit, many):
-    """Sweep until the residual is at most `goal`, or the visits are used up: (visits, residual [m/s])."""
+    """Sweep until the residual is at most `goal`, or `limit` visits per contact are used up: (visits, residual [m/s]).
+
+    `residual` is that of the start; `count` is the number of contacts.
+    """
     small, most, passes, visits, since, marks = _SKIP_SHARE * goal, limit * count, 0, 0, 0, (_NO_HISTORY, _NO_HISTORY)
     while not residual <= goal and visits < most and passes < _PASSES_PER_SWEEP * limit:
         if since == 0:
@@ -297,11 +327,11 @@ def _sweep_until_solved(count, residual, goal, limit, many):
 
 @kernel
 def sweep_contacts(first, last, friction, residual, goal, limit, many):
-    """Improve the impulses of `many.islands.contacts[first:last]` by sweeps until the residual is at most `goal` [m/s].
+    """Improve the impulses of `many.islands.contacts[first:last]` by sweeps: (sweeps, residual [m/s]).
 
-    `contacts.impulse` and `bodies.twist` are consistent. They hold the start, whose residual is given, and receive the
-    result. Returns the number of sweeps, at most `limit`, and the residual of the result. n visits for n contacts count
-    as a sweep, and so do fewer; the last sweep begun is finished.
+    It stops at a residual of at most `goal`, or after `limit` sweeps. n visits for n contacts count as a sweep; the
+    last sweep begun is finished. `residual` is that of the start, and `friction` is None if the scene has no friction.
+    `contacts.impulse` and `bodies.twist` hold the start, consistent with each other, and receive the result.
     """
     if friction is None:
         return sweep_normals(first, last, residual, goal, limit, many)

@@ -1,22 +1,23 @@
 """Interior-point method for hard contact problems of an island, from any start.
 
-With p̂ = (μ p_n, p_t) and û = (u_n/μ + |u_t|, u_t) Coulomb's law is û ∈ L, p̂ ∈ L, p̂ ∘ û = 0 for the Lorentz cone L
-(De Saxcé's change of variables) [1]_. The method keeps both inside L and lets p̂ ∘ û shrink to nothing evenly: each
-iteration is one Newton step for
+Let p be the impulses of a contact, u its velocity error and x the change of the bodies' twists. With p̂ = (μ p_n, p_t)
+and û = (u_n/μ + |u_t|, u_t), Coulomb's law is û ∈ L, p̂ ∈ L, p̂ ∘ û = 0 for the Lorentz cone L (De Saxcé's change of
+variables) [1]_. The method keeps p̂ and û inside L, and lets the product p̂ ∘ û shrink to zero at the same rate for all
+contacts. Each iteration is one Newton step for
 
     x = M⁻¹ Jᵀ p,    û = S (J x + b) + |û_t| e,    p̂ ∘ û = σ ν e,
 
-scaled as in `second_order_cone` (λ = W p̂ = W⁻¹ û), first with σ = 0, which measures the possible step, then with the σ
-and the second-order term that follow from it (Mehrotra [2]_). The derivative of |û_t| is taken along, which makes the
-matrix unsymmetric, and its blocks are those of Newton's method on twists (`newton_system`). What counts is measured as
-everywhere, by the natural map.
+with S = diag(1/μ, 1, 1), e = (1, 0, 0), ν the mean of p̂·û, and the scaling of `second_order_cone` (λ = W p̂ = W⁻¹ û).
+A predictor step with σ = 0 measures how far a step may go. The corrector step has the σ and the second-order term that
+follow from it (Mehrotra [2]_). The derivative of |û_t| is included, so that the matrix is unsymmetric. Its blocks are
+those of Newton's method on twists (`newton_system`). The result is measured, as elsewhere, by the natural-map residual.
 
-Where û_t is small its direction d turns with every step, and the matrix, with d in it, can be next to singular: steps
-lead to the boundary of the cones at once, and the method sticks there. Without d, |û_t| taken as given, it is that of
-a minimum, symmetric and positive definite, and steps are long; but |û_t| then follows slowly, or not at all. So after a
-short step less of d is taken along, after others more again.
+Where û_t is small, its direction d turns with every step. The matrix, which contains d, can then be nearly singular:
+steps reach the boundary of the cones at once, and the method is stuck there. Without d, with |û_t| taken as given, the
+matrix is that of a minimum, symmetric and positive definite, and steps are long. But |û_t| then follows slowly, or not
+at all. So a share of d is included, which shrinks after a short step and grows after others.
 
-Without friction of a contact its cone is a half line: S = (1, 0, 0).
+The cone of a contact without friction is a half line: S = diag(1, 0, 0).
 
 References
 ----------
@@ -43,41 +44,42 @@ from physics.kernels.multibody.solver.block_lu import (
 )
 from physics.kernels.multibody.solver.newton_system import add_batch_to_matrix, complete_matrix, subtract_twists
 
-# How near to the boundary of the cones a step may lead; least ratio of p̂·û after and before that is aimed at.
+# Share of the way to the boundary of the cones that a step may go; least ratio of p̂·û after and before a predictor
+# step.
 _FRACTION_TO_BOUNDARY = 0.98
 _MIN_CENTERING = 1.0e-4
 
-# Rounding may lead across the boundary, where masses are far apart: x₀ of what is inside is at least this times |x'|,
-# which is rounded by two units in its last place at most.
+# Rounding may lead across the boundary where masses are far apart. So inside the cone x₀ is at least this times |x'|,
+# which has an error of at most two units in its last place.
 _INTERIOR_MARGIN = 1.0 + 4 * 2.0**-52
 
-# Share of a whole step below which one is short; how much of d is taken along after such a step and after another one,
-# relative to before.
+# Share of a whole step below which a step is short; factor of the share of d that is included, after a short step and
+# after any other step.
 _SHORT_STEP = 0.1
 _SLIP_SHRINK, _SLIP_GROWTH = 0.2, 2.0
 
 
 @inlined
 def _units(g, many):
-    """Diagonal of S of the contacts of batch g: (normal, tangents)."""
+    """Diagonal of the matrix S of the module, for the contacts of batch g: (normal entry, tangential entry)."""
     return of.batch_field(g, of.IPM_UNIT, many), of.batch_field(g, of.IPM_UNIT + 1, many)
 
 
 @inlined
 def _apply_units(s, a):
-    """Vector S a."""
+    """Product S a of a contact's vector a and the diagonal matrix S, given as s = (normal, tangential entry)."""
     return (s[0] * a[0], s[1] * a[1], s[1] * a[2])
 
 
 @inlined
 def _unscaled_impulse(s, p):
-    """Impulse p of the scaled p̂."""
+    """Impulse p of a contact from the scaled impulse p̂, for the diagonal s = (normal, tangential entry) of S."""
     return (s[0] * p[0], s[1] * p[1], s[1] * p[2])
 
 
 @inlined
 def _write_units(g, many):
-    """Write the diagonal of S of the contacts of batch g."""
+    """Write the diagonal of the matrix S of the module for batch g: (1/μ, 1), or (1, 0) without friction."""
     mu = of.batch_field(g, of.LANE_MU, many)
     of.put_batch_field(g, of.IPM_UNIT, select_lanes(mu > 0.0, 1.0 / mu, 1.0), many)
     of.put_batch_field(g, of.IPM_UNIT + 1, select_lanes(mu > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0), many)
@@ -85,7 +87,10 @@ def _write_units(g, many):
 
 @inlined
 def _set_starting_point(start, many):
-    """Set a start inside the cones by about `start` [m/s], near the present impulses."""
+    """Set the scaled impulses p̂ and velocities û of all contacts to a point inside the cones (see the module).
+
+    It is inside by about `start` [m/s], and near the present impulses.
+    """
     for g in range(many.counts[NUM_BATCHES]):
         _write_units(g, many)
         s, p = _units(g, many), of.gather_batch(g, many.contacts.impulse, many)
@@ -99,7 +104,11 @@ def _set_starting_point(start, many):
 
 @inlined
 def _add_batch_matrix(g, s, w, x, y, many):
-    """Add batch g to the system: S W⁻² (S + e dᵀ) between its rows, d = (0, x, y) the direction of slip."""
+    """Add Jᵀ S W⁻² (S + e dᵀ) J of the contacts of batch g to the linear system.
+
+    S, W and e are those of the module. s is the diagonal of S, w = (w₀, w₁, w₂, η) the scaling W, and d = (0, x, y) the
+    direction of slip, times the share that is included.
+    """
     f = 1.0 / (w[3] * w[3])
     a, b, c = f * (2.0 * w[0] * w[0] - 1.0), -2.0 * f * w[0] * w[1], -2.0 * f * w[0] * w[2]
     d, e, g2 = f * (1.0 + 2.0 * w[1] * w[1]), 2.0 * f * w[1] * w[2], f * (1.0 + 2.0 * w[2] * w[2])
@@ -111,7 +120,11 @@ def _add_batch_matrix(g, s, w, x, y, many):
 
 @inlined
 def _scale_batch(g, share, many):
-    """Scaling of batch g, its matrix with a share of d, and right side: (p̂·û, residual [m/s])."""
+    """Compute the scaling of batch g, and add its matrix and right side to the system: (p̂·û, residual [m/s]).
+
+    p̂ and û are the scaled impulse and velocity of a contact (see the module); both results have a number for each
+    contact. `share` is the share of the slip direction d that the matrix includes.
+    """
     s, p, u = _units(g, many), of.batch_vector(g, of.IPM_IMPULSE, many), of.batch_vector(g, of.IPM_VELOCITY, many)
     v = of.batch_velocity_error(g, many)
     worst = of.batch_residuals(g, _unscaled_impulse(s, p), v, many)
@@ -136,9 +149,11 @@ def _scale_batch(g, share, many):
 
 @kernel
 def _prepare_predictor(part, share, many):
-    """Prepare scalings, and the right side without the term that centres: (p̂·û of a contact, residual [m/s]).
+    """Compute all scalings, and the system of the predictor step: (mean p̂·û of a contact, largest residual [m/s]).
 
-    The matrix of the contacts, which `complete_matrix` completes.
+    `part` is as in `newton_contacts`; `share` is the share of the slip direction d that the matrix includes. The matrix
+    is the sum over contacts, which `complete_matrix` multiplies by M⁻¹ and adds to 1. The right side is written to
+    `many.newton.defect`.
     """
     first, last, begin, end = part
     clear_system(begin, end, many)
@@ -153,14 +168,18 @@ def _prepare_predictor(part, share, many):
 
 @inlined
 def _scaling_of(g, many):
-    """(w₀, w₁, w₂, η) of the contacts of batch g."""
+    """Scaling W = (w₀, w₁, w₂, η) of the contacts of batch g."""
     w = of.batch_vector(g, of.IPM_SCALING, many)
     return (w[0], w[1], w[2], of.batch_field(g, of.IPM_SCALING + 3, many))
 
 
 @inlined
 def _batch_twist_step(g, s, many):
-    """(S + e dᵀ) J dx for the change of twists in `many.newton.change`, d = (0, x, y) the direction of slip."""
+    """Vectors (S + e dᵀ) J dx of the contacts of batch g, for the change dx of twists in `many.newton.change`.
+
+    S and e are those of the module, s is the diagonal of S, and d = (0, x, y) is the direction of slip, times the share
+    that is included.
+    """
     x, y = of.batch_field(g, of.IPM_SLIP_DIRECTION, many), of.batch_field(g, of.IPM_SLIP_DIRECTION + 1, many)
     d = _apply_units(s, of.batch_velocity(g, many.newton.change, ANGULAR_OFFSET, many))
     return (d[0] + (x * d[1] + y * d[2]), d[1], d[2])
@@ -168,12 +187,16 @@ def _batch_twist_step(g, s, many):
 
 @inlined
 def _find_step_length(part, is_corrected, many):
-    """Compute the changes W dp̂ and dû for `many.newton.change`: (their largest step, p̂·û of a contact after it).
+    """Compute the changes dp̂ and dû that belong to the change of twists in `many.newton.change`: (step, product).
 
-    Let f be the vector in the batches if `is_corrected`, else 0. The changes satisfy W dp̂ + W⁻¹ dû = f - λ. The second
-    number is right only for f = 0.
+    p̂ and û are the scaled impulse and velocity of a contact (see the module). The step, at most 1, is the largest that
+    stays inside all cones. The product is the mean p̂·û of a contact after that step. The changes satisfy
+
+        W dp̂ + W⁻¹ dû = f - λ,
+
+    where f is the corrector (`IPM_CORRECTION`) if `is_corrected`, else 0. The product is right only without corrector.
     """
-    most = Lanes(1.0, 1.0, 1.0, 1.0)  # of what 1/t must be at least
+    most = Lanes(1.0, 1.0, 1.0, 1.0)  # lower bounds of 1/t, a lane each
     square = product = Lanes(0.0, 0.0, 0.0, 0.0)
     for g in range(many.counts[NUM_BATCHES]):
         own, inverse, on = (
@@ -203,7 +226,7 @@ def _find_step_length(part, is_corrected, many):
 
 @inlined
 def _set_right_side(part, many):
-    """Set `many.change` to the right side of `_prepare_predictor`."""
+    """Copy the right side of `_prepare_predictor` to `many.newton.change`, for the bodies of the island `part`."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(COLUMN_SIZE):
@@ -212,7 +235,14 @@ def _set_right_side(part, many):
 
 @inlined
 def _set_corrector(part, center, many):
-    """Right side with σ ν = `center` and the second-order term of the changes found so far: λ ∘ f = σ ν e - … ."""
+    """Write the right side of the corrector step to `many.newton.change`; `center` is the target product σ ν.
+
+    The corrector f of each contact solves
+
+        λ ∘ f = σ ν e - (W dp̂) ∘ (W⁻¹ dû),
+
+    with the changes dp̂ and dû of the predictor step (see the module). It is stored in the batches.
+    """
     _set_right_side(part, many)
     for g in range(many.counts[NUM_BATCHES]):
         own, a = of.batch_vector(g, of.IPM_LAMBDA, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many)
@@ -232,13 +262,13 @@ def _set_corrector(part, center, many):
 
 @inlined
 def _move_inside_cone(a):
-    """Vector a, moved inside the cone."""
+    """Vector a with its first component raised, if need be, so that it is inside the cone despite rounding."""
     return (larger(a[0], _INTERIOR_MARGIN * of.planar_length(a[1], a[2])), a[1], a[2])
 
 
 @inlined
 def _take_step(part, t, many):
-    """Take the share t of the step."""
+    """Change the scaled impulses p̂ and velocities û, and the twists of the island `part`, by a share t of the step."""
     for g in range(many.counts[NUM_BATCHES]):
         dp = second_order_cone.apply_inv_scaling(_scaling_of(g, many), of.batch_vector(g, of.IPM_IMPULSE_STEP, many))
         of.put_batch_vector(
@@ -256,7 +286,7 @@ def _take_step(part, t, many):
 
 @inlined
 def _write_solution(part, many):
-    """Write the impulses, and the twists that they cause."""
+    """Write the impulses in the batches to the contacts of the island `part`, and the twists that they cause."""
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
         for c in range(TWIST_DOFS):
@@ -274,12 +304,15 @@ def interior_point_contacts(part, start, goal, limit, many):
     Parameters
     ----------
     part : tuple of 4 ints
-        As for `newton_contacts`; the bodies are ordered for elimination.
+        Island as for `newton_contacts`; its bodies are ordered for elimination.
     start : float
-        How far inside the cones to begin, about the residual of the impulses as they are [m/s].
+        Distance from the boundary of the cones to begin with, about the residual of the present impulses [m/s].
     goal : float
-        Residual to stop at [m/s], before the impulses and twists are made to belong to each other.
+        Residual to stop at [m/s]. It is measured before the twists are computed anew from the impulses.
     limit : int
+        Largest number of iterations.
+    many : BodiesWorkspace
+        Workspace of the world; `contacts.impulse` and `bodies.twist` receive the result.
     """
     _, _, begin, end = part
     _set_starting_point(start, many)

@@ -1,7 +1,7 @@
 """Islands: groups of bodies connected by contacts, walls left out. Each is a contact problem of its own.
 
-Contacts and bodies are listed island by island, in the order in which they were before (union-find, then a counting
-sort), so that what one island costs does not depend on what happens in another.
+Contacts and bodies are listed island by island (union-find, then a counting sort). Within an island they keep the order
+of their indices, so that the results of an island do not depend on other islands.
 
 Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorithm*, J. ACM 22, 1975 (with path halving).
 """
@@ -14,7 +14,7 @@ from physics.kernels.math.union_find import find_root, unite_sets
 
 @inlined
 def union_contacts(n, many):
-    """Link every body to the first one of its island in `many.islands.parent`."""
+    """Join the bodies of the n contacts into islands, as a union-find forest in `many.islands.parent`."""
     parent = many.islands.parent
     for b in range(parent.shape[0]):
         parent[b] = b
@@ -25,7 +25,11 @@ def union_contacts(n, many):
 
 @inlined
 def _list_contacts(n, many):
-    """Number the islands by their first contacts and list the contacts; return the number of islands."""
+    """Number the islands in the order of their first contacts, and list the n contacts; return the number of islands.
+
+    Writes `many.islands.contacts` and `first_contact`. The number of an island is stored in `of_body` at the root body
+    of the island in the union-find forest.
+    """
     island, begin, parent, count = many.islands.of_body, many.islands.first_contact, many.islands.parent, 0
     for b in range(island.shape[0]):
         island[b] = -1
@@ -50,7 +54,7 @@ def _list_contacts(n, many):
 
 @inlined
 def _list_bodies(count, many):
-    """List the bodies of the islands in `many.islands.bodies`."""
+    """List the bodies of the `count` islands in `many.islands.bodies`, and write `of_body` and `first_body`."""
     island, begin, total = many.islands.of_body, many.islands.first_body, 0
     for i in range(count + 1):
         begin[i] = 0
@@ -71,7 +75,7 @@ def _list_bodies(count, many):
 
 @kernel
 def find_islands(n, many):
-    """Sort the n contacts into islands; return the number of islands.
+    """Sort the n contacts of the set, and their bodies, into islands; return the number of islands.
 
     Contacts of island i are `many.islands.contacts[first_contact[i] : first_contact[i + 1]]`, its bodies
     `many.islands.bodies[first_body[i] : first_body[i + 1]]`.

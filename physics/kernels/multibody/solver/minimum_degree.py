@@ -1,8 +1,8 @@
-"""Order of elimination of the bodies of an island, and the 6 x 6 blocks that it fills.
+"""Order in which the bodies of an island are eliminated from its linear system, and the 6 x 6 blocks that this fills.
 
-Minimum degree: always the body with the fewest neighbours is next, and its neighbours become neighbours of each other.
-A tower, or bodies side by side on one plate, fill nothing whatever the numbers of their bodies; a heap fills little,
-for most of its bodies lie on a wall or on two or three others.
+Minimum degree: the body with the fewest neighbours is always eliminated next, and its neighbours become neighbours of
+each other. Towers, and bodies side by side on one plate, get no fill, whatever the numbers of their bodies. Heaps get
+little, since most of their bodies lie on a wall or on two or three others.
 
 References
 ----------
@@ -20,7 +20,7 @@ _NO_ENTRY = -1
 
 @inlined
 def _add_neighbour(a, b, many):
-    """Add b to the front of a's list of neighbours; return whether there was room."""
+    """Add body b to the front of body a's list of neighbours; return False if there was no room."""
     k = many.system.links[0]
     if k == many.system.neighbour.shape[0]:
         return False
@@ -32,7 +32,7 @@ def _add_neighbour(a, b, many):
 
 @inlined
 def _mark_neighbours(a, mark, many):
-    """Write `mark` to a and to all its remaining neighbours."""
+    """Write the stamp `mark` to body a and to all bodies in its list of neighbours."""
     many.system.mark[a] = mark
     k = many.system.head[a]
     while k != _NO_ENTRY:
@@ -42,7 +42,7 @@ def _mark_neighbours(a, mark, many):
 
 @inlined
 def _put_in_bucket(b, many):
-    """Add b to the front of the list of bodies of its degree."""
+    """Add body b to the front of the list (bucket) of bodies of its degree."""
     d = many.system.degree[b]
     many.system.ahead[b], many.system.behind[b] = _NO_ENTRY, many.system.bucket[d]
     if many.system.bucket[d] != _NO_ENTRY:
@@ -52,7 +52,7 @@ def _put_in_bucket(b, many):
 
 @inlined
 def _take_from_bucket(b, many):
-    """Take b out of the list of bodies of its degree."""
+    """Take body b out of the list (bucket) of bodies of its degree."""
     if many.system.ahead[b] == _NO_ENTRY:
         many.system.bucket[many.system.degree[b]] = many.system.behind[b]
     else:
@@ -63,7 +63,10 @@ def _take_from_bucket(b, many):
 
 @inlined
 def _build_graph(first, last, begin, end, many):
-    """Find the neighbours of an island's bodies from its contacts; return whether there was room."""
+    """Build the lists of neighbours of an island's bodies from its contacts; return False if there was no room.
+
+    The island has contacts `islands.contacts[first:last]` and bodies `islands.bodies[begin:end]`.
+    """
     many.system.links[0] = 0
     for i in range(begin, end):
         b = many.islands.bodies[i]
@@ -86,7 +89,10 @@ def _build_graph(first, last, begin, end, many):
 
 @inlined
 def _write_column(b, at, many):
-    """Write b's remaining neighbours to `many.system.column` from `at` on; return their end, or -1 without room."""
+    """Write the remaining neighbours of body b to `many.system.column`, from position `at` on.
+
+    Returns the position behind them, or -1 if there was no room.
+    """
     k = many.system.head[b]
     while k != _NO_ENTRY:
         other = many.system.neighbour[k, 0]
@@ -101,7 +107,10 @@ def _write_column(b, at, many):
 
 @inlined
 def _eliminate_body(start, end, b, many):
-    """Remove b from its neighbours `system.column[start:end]`, which become neighbours; return whether they fit."""
+    """Eliminate body b: its remaining neighbours become neighbours of each other, and their degrees no longer count b.
+
+    The remaining neighbours are `many.system.column[start:end]`. Returns False if there was no room for the new ones.
+    """
     for i in range(start, end):
         a = many.system.column[i]
         _take_from_bucket(a, many)
@@ -119,10 +128,11 @@ def _eliminate_body(start, end, b, many):
 
 @kernel
 def order_elimination(first, last, begin, end, most, many):
-    """Order the bodies `islands.bodies[begin:end]` with contacts `islands.contacts[first:last]` for elimination.
+    """Order the bodies of an island for elimination; return the number of products of 6 x 6 blocks that it takes.
 
-    `system.rank` receives the position of each, `system.column[start[b] : stop[b]]` its neighbours that come later.
-    Returns the products of blocks that elimination takes; -1: there is no room for it, or they are more than `most`.
+    The island has contacts `islands.contacts[first:last]` and bodies `islands.bodies[begin:end]`, which are sorted into
+    the order. `system.rank` receives the position of each body, `system.column[start[b] : stop[b]]` the neighbours of
+    body b that come later. The result is -1 if there is no room, or if the number is more than `most`.
     """
     if not _build_graph(first, last, begin, end, many):
         return -1

@@ -1,15 +1,16 @@
 """Solve islands that are nearly at rest below the tolerance, so that residual velocities decay instead of cycling.
 
-A solve leaves velocities within a goal, and stops. What stands would have no velocity; so the next stage has to stop
-that, and its impulses hold the load and stop motion that is over afterwards. They start the solve of the stage that
-follows, which then begins with 2 v' - v for velocities v' now and v a stage ago. If sweeps leave a share s of that, the
-velocities go like zᵏ with z² - 2 s z + s = 0, |z| = √s: they would vanish, but that nothing is swept within the goal,
-where they grow again. So a pile that lies would go on at some goals of speed, each body in its own cycle, and a problem
-that is hard would be solved anew in each of them.
+A solve stops once its residual is within a goal, and so leaves small velocities. The next stage has to stop them, and
+its impulses hold the loads and stop motion that is over afterwards. These impulses are the warm start of the stage that
+follows. That stage begins with velocities 2 v' - v, for velocities v' now and v a stage ago. If sweeps leave a share s
+of them, the velocities evolve like zᵏ over k stages, with z² - 2 s z + s = 0 and |z| = √s. They would vanish, but
+within the goal nothing is swept, and they grow again. So a resting pile would go on moving at a few times the goal,
+each body in a cycle of its own, and a hard problem would be solved anew in each cycle.
 
-An island is left alone where every body keeps its velocity to a small share of the goal: loads and impulses balance.
-One that holds as a whole does after one linear system, and for long; others are swept. Under error control
-nothing is: goals are next to rounding there, and a high arch at its limit, swept in every part, was solved no more.
+An island is left alone if every body keeps its velocity to a small share of the goal: loads and impulses balance. An
+island in which every contact sticks reaches this by one linear system, and for long; other islands are swept. Under
+error control there is no refinement: goals are close to rounding there, and a high arch at its limit, swept in every
+part, was solved no better.
 """
 
 from __future__ import annotations
@@ -29,31 +30,34 @@ from physics.kernels.multibody.solver.proximal_newton import (
 )
 from physics.kernels.state.layout import METHOD_NEWTON, METHOD_SWEEPS
 
-# Goals of speed within which all bodies of an island have to be before a stage, and the share of the goal that is swept
-# to.
+# Largest speed of a body in an island that counts as nearly at rest, in goals; share of the goal to which it is
+# refined.
 _NEAR_REST_SPEED = 100.0
 BALANCE_SHARE = 1.0e-3
 
-# Sweeps in a stage. With 2, 4 and 8 of them piles lie as still.
+# Largest number of sweeps in a stage. Piles rest equally well with 2, 4 and 8.
 _NEAR_REST_SWEEPS = 4
 
 
 @inlined
 def _refined_tolerance(goal, least):
-    """Tolerance of the sweeps [m/s]; a balance of loads and impulses allows changes of velocity twice as large."""
+    """Residual to which islands nearly at rest are refined [m/s]; balance allows velocity changes twice as large.
+
+    `goal` is the residual of an ordinary solve, `least` the residual that rounding leaves [m/s].
+    """
     return max(BALANCE_SHARE * goal, least)
 
 
 @inlined
 def point_speed_bound(v, w, b, many):
-    """Bound of the speed of any point of body b that moves with v and turns with w [m/s]."""
+    """Bound of the speed of any point of body b with velocity v [m/s] and angular velocity w [rad/s]."""
     linear = max(abs(v[0]), max(abs(v[1]), abs(v[2])))
     return linear + many.bodies.body[b].radius * (abs(w[0]) + abs(w[1]) + abs(w[2]))
 
 
 @inlined
 def _keeps_velocity(b, most, many):
-    """True if the velocity of body b has changed by at most `most` in this resting stage [m/s].
+    """True if no point of body b has changed its velocity by more than `most` [m/s] in this resting stage.
 
     Velocities before the stage are in `many.bodies.momenta`, those after it in `many.bodies.twist`.
     """
@@ -71,7 +75,10 @@ def _keeps_velocity(b, most, many):
 
 @kernel
 def is_in_balance(goal, least, many):
-    """True if no island needs `near_rest_refinement`."""
+    """True if no island needs refinement: each touching body keeps its velocity, or this is no resting stage.
+
+    `goal` and `least` are as in `_refined_tolerance`.
+    """
     if many.settings[0].is_resting_stage == 1:
         for b in range(many.bodies.twist.shape[0]):
             if many.bodies.touched[b] == 1 and not _keeps_velocity(b, 2.0 * _refined_tolerance(goal, least), many):
@@ -81,7 +88,11 @@ def is_in_balance(goal, least, many):
 
 @inlined
 def _needs_refinement(part, speed, change, many):
-    """True if all bodies of an island were slower than `speed`, and one changed by more than `change` [m/s]."""
+    """True if an island was nearly at rest before the stage, and does not keep its velocity.
+
+    All its bodies were slower than `speed`, and one of them changed its velocity by more than `change` [m/s]. `part` is
+    as in `proximal_newton.newton_contacts`.
+    """
     is_balanced = True
     for i in range(part[2], part[3]):
         b = many.islands.bodies[i]
@@ -101,10 +112,12 @@ def _needs_refinement(part, speed, change, many):
 
 @kernel
 def refine_near_rest(part, friction, residual, goal, deep, least, many):
-    """Refine an island that is solved to the goal and nearly at rest: (iterations, residual [m/s], method).
+    """Refine an island that is solved to `goal` and nearly at rest: (iterations, residual [m/s], method).
 
-    An island of sticking contacts is solved to `deep`, another one by some sweeps as far as `least`. Nothing happens
-    outside resting stages, or if the residual would grow beyond the goal.
+    An island in which every contact pushes is first solved with all contacts sticking, to `deep` [m/s]. If the residual
+    is still too large, a few sweeps refine it; `least` is the residual that rounding leaves [m/s]. Nothing changes
+    outside resting stages, or if the residual would grow beyond the goal. `part` and `friction` are as in
+    `proximal_newton.newton_contacts`.
     """
     fine = _refined_tolerance(goal, least)
     if many.settings[0].is_resting_stage == 0 or not fine < residual <= goal:

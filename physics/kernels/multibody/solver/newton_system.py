@@ -1,4 +1,8 @@
-"""System of `proximal_newton`: its defect x - M⁻¹ Jᵀ p(x), and its matrix 1 + M⁻¹ Jᵀ ρ p' J."""
+"""Linear system of a Newton step in `proximal_newton`, for the twists x of an island's bodies.
+
+Its right side is the defect x - M⁻¹ Jᵀ p(x), its matrix is 1 + M⁻¹ Jᵀ ρ p' J. p(x) are the impulses of the contacts for
+the twists x, and p' is the derivative of their projection on the friction cones.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,10 @@ from physics.kernels.multibody.solver.contact_batches import BATCH_BLOCK, BATCH_
 
 @inlined
 def project_impulse(y, mu):
-    """Projection of `y` to admissible impulses: no pull, and the tangential part inside its disk."""
+    """Impulse y (normal, two tangents) projected on the friction cone with the coefficient `mu`.
+
+    A negative normal part becomes 0, and the tangential part is shortened to `mu` times the normal part.
+    """
     normal = larger(y[0], 0.0)
     size, limit = of.planar_length(y[1], y[2]), mu * normal
     s = select_lanes(size > limit, limit / size, 1.0)
@@ -25,7 +32,7 @@ def project_impulse(y, mu):
 
 @inlined
 def subtract_twists(b, a, c, many):
-    """Set column b of `many.newton.defect` to row b of twists a minus that of twists c."""
+    """Set column b of `many.newton.defect` to the difference a - c of two twists of body b, from arrays (bodies, 6)."""
     D = many.newton.defect
     D[b, 0], D[b, 1], D[b, 2] = a[b, 0] - c[b, 0], a[b, 1] - c[b, 1], a[b, 2] - c[b, 2]
     D[b, ANGULAR_OFFSET], D[b, ANGULAR_OFFSET + 1], D[b, ANGULAR_OFFSET + 2] = (
@@ -37,10 +44,12 @@ def subtract_twists(b, a, c, many):
 
 @kernel
 def compute_defect(part, rho, all_hold, many):
-    """Write x - M⁻¹ Jᵀ p(x) of an island's bodies into `many.newton.defect`, and p(x) into the batches.
+    """Compute the defect x - M⁻¹ Jᵀ p(x) of an island: (its norm weighted by mass, its largest velocity [m/s]).
 
-    Returns the defect's norm weighted by mass, and its largest velocity. With `all_hold` the law is left out: p = q - ρ
-    u.
+    x is the change of the twists by the impulses: `bodies.twist` minus `bodies.free_twist`. p(x) is q - ρ u, for the
+    impulses q in the batches and velocity errors u, projected on the friction cones. With `all_hold` it is not
+    projected: every contact sticks. The defect is written to `many.newton.defect`, p(x) to the batches. `part` is as in
+    `newton_contacts`, `rho` the penalty ρ [kg].
     """
     _, _, begin, end = part
     for i in range(begin, end):
@@ -70,7 +79,7 @@ def compute_defect(part, rho, all_hold, many):
 
 @inlined
 def _projection_jacobian(y, mu):
-    """Derivative of the law, row by row: 0 for y <= 0."""
+    """Derivative of `project_impulse` at y, row by row; 0 unless the normal part of y is positive."""
     size, limit, on = of.planar_length(y[1], y[2]), mu * y[0], select_lanes(y[0] > 0.0, Lanes(1.0, 1.0, 1.0, 1.0), 0.0)
     slips = size > limit
     a, b = select_lanes(slips, y[1] / size, 0.0), select_lanes(slips, y[2] / size, 0.0)
@@ -82,7 +91,7 @@ def _projection_jacobian(y, mu):
 
 @inlined
 def _world_rows(D, E, weight):
-    """Rows of Eᵀ D E times `weight`, with D given in the frame whose axes are the rows of E."""
+    """Rows of Eᵀ D E times `weight`: the matrix D of each contact, turned from its frame E to the world frame."""
     x = qt.transposed_matvec(D, (weight * E[0], weight * E[3], weight * E[6]))
     y = qt.transposed_matvec(D, (weight * E[1], weight * E[4], weight * E[7]))
     z = qt.transposed_matvec(D, (weight * E[2], weight * E[5], weight * E[8]))
@@ -91,31 +100,34 @@ def _world_rows(D, E, weight):
 
 @inlined
 def _sum(a):
-    """Sum of a batch's vectors, as half a column."""
+    """Sum of the vectors of a batch over its contacts, as half a column of `block_lu`."""
     return lane_sums(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
 @inlined
 def _columns(x, y, z):
-    """Columns of the matrices with rows x, y, z."""
+    """Three columns of the matrix whose rows are x, y and z, for all contacts of a batch."""
     return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
 
 @inlined
 def _sum_columns(A):
-    """Sums of three columns."""
+    """Sums over the contacts of a batch of three columns A, as halves of `block_lu`."""
     return _sum(A[0]), _sum(A[1]), _sum(A[2])
 
 
 @inlined
 def _moment_columns(r, A):
-    """Moments of three columns: sums of r x each."""
+    """Sums over the contacts of a batch of r x each of three columns A, as halves of `block_lu`."""
     return _sum(qt.cross(r, A[0])), _sum(qt.cross(r, A[1])), _sum(qt.cross(r, A[2]))
 
 
 @inlined
 def _add_columns(B, place, c, upper, lower):
-    """Add halves of three columns to those of block B[place] from c on."""
+    """Add three columns to columns c, c + 1 and c + 2 of block B[place].
+
+    `upper` and `lower` have the first and the second halves of the three columns.
+    """
     first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
     store_lanes(B, place, first, load_lanes(B, place, first) + upper[0])
     store_lanes(B, place, first + ANGULAR_OFFSET, load_lanes(B, place, first + ANGULAR_OFFSET) + lower[0])
@@ -127,7 +139,10 @@ def _add_columns(B, place, c, upper, lower):
 
 @inlined
 def _subtract_columns(B, place, c, upper, lower):
-    """Subtract halves of three columns from those of block B[place] from c on."""
+    """Subtract three columns from columns c, c + 1 and c + 2 of block B[place].
+
+    `upper` and `lower` have the first and the second halves of the three columns.
+    """
     first, second, third = COLUMN_SIZE * c, COLUMN_SIZE * (c + 1), COLUMN_SIZE * (c + 2)
     store_lanes(B, place, first, load_lanes(B, place, first) - upper[0])
     store_lanes(B, place, first + ANGULAR_OFFSET, load_lanes(B, place, first + ANGULAR_OFFSET) - lower[0])
@@ -139,13 +154,14 @@ def _subtract_columns(B, place, c, upper, lower):
 
 @kernel
 def add_batch_to_matrix(g, D, rho, many):
-    """Add Jᵀ ρ D J of the contacts of batch g to the blocks of its bodies; D row by row in the contacts' frames.
+    """Add Jᵀ ρ D J of the contacts of batch g to the blocks of its two bodies.
 
-    With A = ρ Eᵀ D E and J = (1, -[r]x) from the twist of a body to the velocity of its point, a block is
+    D is a 3 x 3 matrix of each contact in the contact frame E, row by row. J = (1, -[r]x) turns the twist of a body
+    into the velocity at the end of its arm r. With A = ρ Eᵀ D E a block is
 
         Jᵀ A J = (1; [r]x) A (1, -[s]x)
 
-    for the arms r of the body of its rows and s of that of its columns. Rows of -A [s]x are s x those of A.
+    for the arms r of the body of its rows and s of the body of its columns. The rows of -A [s]x are s x the rows of A.
     """
     a, b = many.newton.batch[g, BATCH_BODY_A], many.newton.batch[g, BATCH_BODY_B]
     x, y, z = _world_rows(D, of.batch_frames(g, many), rho * of.batch_field(g, of.LANE_WEIGHT, many))
@@ -176,7 +192,7 @@ def add_batch_to_matrix(g, D, rho, many):
 
 @inlined
 def _apply_inv_mass(B, place, b, many):
-    """Multiply the rows of the block B[place] by M⁻¹ of body b."""
+    """Multiply block B[place] from the left by M⁻¹, the inverse mass and inverse inertia of body b."""
     m, K = many.bodies.inv_mass[b], many.bodies.inv_inertia
     x = Lanes(K[b, 0], K[b, 1], K[b, 2], 0.0)
     y = Lanes(K[b, 1], K[b, 3], K[b, 4], 0.0)
@@ -189,7 +205,7 @@ def _apply_inv_mass(B, place, b, many):
 
 @inlined
 def complete_matrix(begin, end, many):
-    """Complete the matrix: 1 + M⁻¹ times the sum over contacts."""
+    """Complete the matrix of the bodies `many.islands.bodies[begin:end]`: multiply it by M⁻¹, and add 1."""
     for i in range(begin, end):
         b = many.islands.bodies[i]
         _apply_inv_mass(many.system.diagonal, b, b, many)
@@ -202,7 +218,10 @@ def complete_matrix(begin, end, many):
 
 @kernel
 def assemble_newton_matrix(part, rho, all_hold, many):
-    """Assemble Newton's matrix of an island at the point of the last `compute_defect`."""
+    """Assemble Newton's matrix 1 + M⁻¹ Jᵀ ρ p' J of an island, at the point of the last `compute_defect`.
+
+    Arguments are as in `compute_defect`.
+    """
     _, _, begin, end = part
     clear_system(begin, end, many)
     for g in range(many.counts[NUM_BATCHES]):

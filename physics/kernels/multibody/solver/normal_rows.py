@@ -1,13 +1,14 @@
-"""Rows of the normals' Jacobian J and of M⁻¹ Jᵀ, for sweeps along normals; a visit reads them as `lanes`.
+"""Rows of the normals' Jacobian J and of M⁻¹ Jᵀ, for sweeps along normals only.
 
-For the normal n of a contact and the arms r, s from its bodies
+For the normal n of a contact and the arms r, s from its bodies a, b
 
-    u_n = n·(v_a - v_b) + (r x n)·ω_a - (s x n)·ω_b,
+    u_n = n·(v_a - v_b) + (r x n)·ω_a - (s x n)·ω_b.
 
-and an impulse p changes v_a by p n/m_a and ω_a by p I_a⁻¹ (r x n), those of b by as much the other way. A row of
-`many.sweeps.normal_rows` has n, r x n, I_a⁻¹ (r x n), s x n and I_b⁻¹ (s x n); `many.sweeps.motion` has the twists
-meanwhile. A vector is three numbers and one that is zero: a sum over four lanes is that over three. The zero is written
-each time, since what is not a number in one world would stay there for all that come after it.
+An impulse p changes v_a by p n/m_a and ω_a by p I_a⁻¹ (r x n). It changes v_b by -p n/m_b and ω_b by
+-p I_b⁻¹ (s x n). A row of `many.sweeps.normal_rows` has n, r x n, I_a⁻¹ (r x n), s x n and I_b⁻¹ (s x n).
+`many.sweeps.motion` has the twists during the sweeps. A vector is stored as three numbers and a zero, and read as
+`Lanes`, so that a sum over four lanes is a sum over three numbers. The zero is written each time. Otherwise a NaN from
+one world could stay there for all later ones.
 """
 
 from __future__ import annotations
@@ -20,13 +21,13 @@ from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
-# Where the vectors begin: normal, its moment about a and that moment's turning, those of b.
+# First columns of the vectors of a row: n, r x n, I_a⁻¹ (r x n), s x n, I_b⁻¹ (s x n).
 ROW_NORMAL, ROW_MOMENT_A, ROW_RESPONSE_A, ROW_MOMENT_B, ROW_RESPONSE_B = range(0, 20, 4)
 
 
 @inlined
 def put_padded(array, i, j, a):
-    """Write a vector followed by a zero."""
+    """Write the vector a, followed by a zero, to row i of an array from column j on."""
     store_lanes(array, i, j, Lanes(a[0], a[1], a[2], 0.0))
 
 
@@ -38,14 +39,14 @@ def _motion_from_twist(b, many):
 
 @inlined
 def body_twist_from_motion(b, many):
-    """Twist of body b from `many.sweeps.motion`."""
+    """Copy the twist of body b from `many.sweeps.motion` to `many.bodies.twist`."""
     put_vector(many.bodies.twist, b, 0, row_vector(many.sweeps.motion, b, 0))
     put_vector(many.bodies.twist, b, 3, row_vector(many.sweeps.motion, b, ANGULAR_OFFSET))
 
 
 @inlined
 def motion_from_twists(first, last, many):
-    """`many.sweeps.motion` of the bodies of the contacts `many.islands.contacts[first:last]` from their twists."""
+    """Copy twists to `many.sweeps.motion`, for the bodies of the contacts `many.islands.contacts[first:last]`."""
     for i in range(first, last):
         a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
         _motion_from_twist(a, many)
@@ -55,7 +56,7 @@ def motion_from_twists(first, last, many):
 
 @inlined
 def twists_from_motion(first, last, many):
-    """Twists of the bodies of the contacts `many.islands.contacts[first:last]` from `many.sweeps.motion`."""
+    """Copy twists from `many.sweeps.motion`, for the bodies of the contacts `many.islands.contacts[first:last]`."""
     for i in range(first, last):
         a, b = many.contacts.bodies[many.islands.contacts[i], 0], many.contacts.bodies[many.islands.contacts[i], 1]
         body_twist_from_motion(a, many)
@@ -65,7 +66,10 @@ def twists_from_motion(first, last, many):
 
 @inlined
 def _normal_mobility(k, b, first, moment, many):
-    """Share of one end in a contact's W_nn; writes its normal's vectors to `many.sweeps.normal_rows`."""
+    """Share of body b in W_nn of contact k [1/kg]; writes r x n and I⁻¹ (r x n) to `many.sweeps.normal_rows`.
+
+    `first` is the column of the body's arm r in `many.contacts.arm`, `moment` that of r x n in the row.
+    """
     g = qt.cross(row_vector(many.contacts.arm, k, first), row_vector(many.contacts.frame, k, 0))
     h = apply_body_inv_inertia(b, g, many)
     put_padded(many.sweeps.normal_rows, k, moment, g)
@@ -75,7 +79,7 @@ def _normal_mobility(k, b, first, moment, many):
 
 @inlined
 def assemble_normal_row(k, many):
-    """Write the data of contact k's normal: W_nn and its row."""
+    """Write row k of `many.sweeps.normal_rows`, and W_nn of contact k to `many.contacts.block[k, 0]`."""
     put_padded(many.sweeps.normal_rows, k, ROW_NORMAL, row_vector(many.contacts.frame, k, 0))
     W = _normal_mobility(k, many.contacts.bodies[k, 0], 0, ROW_MOMENT_A, many)
     if many.contacts.bodies[k, 1] >= 0:
@@ -85,7 +89,7 @@ def assemble_normal_row(k, many):
 
 @inlined
 def normal_velocity(k, many):
-    """Normal velocity u_n of contact k."""
+    """Normal velocity u_n at contact k, from `many.sweeps.motion` [m/s]."""
     R, t, a, b = many.sweeps.normal_rows, many.sweeps.motion, many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     v = load_lanes(t, a, 0)
     if b >= 0:
@@ -103,7 +107,7 @@ def _add_padded(b, first, x, many):
 
 @inlined
 def apply_normal_impulse(k, p, many):
-    """Change the motion of both bodies by an impulse p along the normal of contact k [N s]."""
+    """Change the motion of both bodies of contact k by an impulse p along its normal [N s]."""
     R, a, b = many.sweeps.normal_rows, many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     n = load_lanes(R, k, ROW_NORMAL)
     _add_padded(a, 0, (many.bodies.inv_mass[a] * p) * n, many)

@@ -1,18 +1,20 @@
-"""Newton's method on the twists of all bodies, in a proximal-point iteration, for problems on which sweeps crawl.
+"""Newton's method on the twists of all bodies of an island, in a proximal-point iteration.
 
-What `physics.kernels.contact_solver.proximal_newton` does for one body, for a world of them. With x the change of all
-twists, for impulses q near the solution let
+It serves problems on which sweeps converge slowly, and does for several bodies what
+`physics.kernels.contact_solver.proximal_newton` does for one. Let x be the change of all twists, q impulses near the
+solution, and ρ a penalty. For each contact let
 
-    p(x) = law(q - ρ u(x)),    u(x) = J x + b,
+    p(x) = proj(q - ρ u(x)),    u(x) = J x + b,
 
-contact by contact; x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twists alone, whose Newton matrix
-1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`block_lu`). Then q = p(x) and again. A round contracts by
-about 1/(1 + ρ w) with w the smallest mobility that matters: the inverse of the heaviest mass that a contact may have to
-carry, whatever that contact's own mass is. So ρ is a multiple of the largest mass in the problem.
+with proj the projection on the friction cone. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twists alone. Its
+Newton matrix 1 + M⁻¹ Jᵀ ρ p' J has a 6 x 6 block where two bodies touch (`block_lu`). A proximal round solves it, and
+sets q = p(x) for the next round. A round contracts the error by about 1/(1 + ρ w), with w the smallest mobility that
+matters. That is the inverse of the heaviest mass that a contact may have to carry, whatever the masses at the contact
+are. So ρ is a multiple of the largest mass in the problem.
 
-The first guess is that everything holds: then the law is linear, and one linear system is the answer for whatever
-stands still, however high or heavy. Where ρ grows too large for Newton's method to find its pieces, the round is
-thrown away and ρ shrinks.
+The first guess is that every contact sticks: then p(x) is linear, and one linear system solves any island that stands
+still, however high or heavy. If ρ grows too large for Newton's method to converge, the round is discarded and ρ
+shrinks.
 """
 
 from __future__ import annotations
@@ -27,32 +29,32 @@ from physics.kernels.multibody.solver.contact_operator import apply_contact_impu
 from physics.kernels.multibody.solver.minimum_degree import order_elimination
 from physics.kernels.multibody.solver.newton_system import assemble_newton_matrix, compute_defect, project_impulse
 
-# ρ in units of the largest mass: of the guess that everything holds, with its rounds; its growth from round to round,
-# the largest, and what it shrinks by when a round fails.
+# ρ in units of the largest mass: its value for the guess that every contact sticks, and the rounds of that guess; then
+# its growth from round to round, its largest value, and the factor by which it shrinks when a round fails.
 _STICK_RHO = 1.0e4
 _STICK_ROUNDS = 5
 _RHO_GROWTH = 10.0
 _RHO_LIMIT = 1.0e8
 _RHO_DECREASE = 30.0
 
-# Rounds that may fail; Newton steps of a round, halvings of a step, and steps without progress, at most.
+# Largest numbers of failed rounds, of Newton steps of a round, of halvings of a step, of steps without progress.
 FAILED_ROUNDS = 4
 _NEWTON_STEPS = 20
 _STEP_HALVINGS = 10
 FAILED_STEPS = 2
 
-# A round is solved to this share of the residual met so far, or of a hundred times the tolerance.
+# A round is solved to this share of the best residual so far, or of a hundred times the goal, whichever is less.
 _ROUND_SHARE = 0.01
 _ROUND_FLOOR = 100.0
 
-# Time of a contact in one sweep, of one in an iteration with the linear system, and of a product of two blocks [ns].
+# Time of a contact in one sweep, of a contact in one Newton step, and of a product of two blocks [ns].
 _SWEEP_COST = 25.0
 _CONTACT_COST = 230.0
 _BLOCK_COST = 60.0
 
-# Cost that iterations with the system may have, in that of the sweeps allowed: while a pile moves and all is new in the
-# next step; and once it nearly lies, where what is solved once holds for long, and what is not creeps for ever.
-# Fewer iterations than these lead nowhere.
+# Allowed cost of iterations with the linear system, in costs of all sweeps allowed. It is small while a pile moves,
+# since the next step brings a new problem. It is large once the pile nearly rests: a solution then lasts for long, and
+# an unsolved pile creeps for ever. Then the least number of iterations that is worth a start.
 MOVING_BUDGET = 10.0
 RESTING_BUDGET = 200.0
 MIN_NEWTON_STEPS = 12
@@ -60,7 +62,7 @@ MIN_NEWTON_STEPS = 12
 
 @inlined
 def _apply_newton_direction(part, many):
-    """Solve the factored system for the defect, and subtract the solution from the twists."""
+    """Solve the factored system for the defect, and subtract the solution from the twists of the island `part`."""
     _, _, begin, end = part
     solve_factored(begin, end, many.newton.defect, many)
     for i in range(begin, end):
@@ -71,7 +73,11 @@ def _apply_newton_direction(part, many):
 
 @kernel
 def _newton_step(part, rho, norm, many):
-    """Take one damped Newton step on the twists from a defect of the given norm: new (norm, largest velocity)."""
+    """Take one damped Newton step on the twists of an island: (norm of the new defect, its largest velocity [m/s]).
+
+    `norm` is the norm of the defect before. The step is halved until the norm decreases. `part` is as in
+    `newton_contacts`, `rho` the penalty ρ [kg].
+    """
     _, _, begin, end = part
     assemble_newton_matrix(part, rho, False, many)
     factor_system(begin, end, many)
@@ -97,7 +103,7 @@ def _newton_step(part, rho, norm, many):
 
 @inlined
 def _apply_impulses(part, many):
-    """Copy the batches' impulses to their contacts, and compute twists from them and the free twists."""
+    """Copy the impulses in the batches to the contacts of the island `part`, and compute the twists they cause."""
     _, _, begin, end = part
     for i in range(begin, end):
         b = many.islands.bodies[i]
@@ -111,7 +117,7 @@ def _apply_impulses(part, many):
 
 @inlined
 def _gather_impulses(many):
-    """Copy the best impulses so far into the batches."""
+    """Copy the contacts' impulses into the batches, as the present and as the best impulses."""
     for g in range(many.counts[NUM_BATCHES]):
         p = of.gather_batch(g, many.contacts.impulse, many)
         of.put_batch_vector(g, of.PROX_IMPULSE, p, many)
@@ -120,14 +126,17 @@ def _gather_impulses(many):
 
 @inlined
 def _save_impulses(many):
-    """Save the present impulses as the best so far."""
+    """Save the present impulses in the batches as the best so far."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(g, of.PROX_BEST, of.batch_vector(g, of.PROX_IMPULSE, many), many)
 
 
 @inlined
 def _accept_trial(part, many):
-    """Take the impulses of the last `compute_defect`, projected by the law, and the twists that they cause."""
+    """Take over the impulses p(x) of the last `compute_defect`, projected on the cones, and the twists they cause.
+
+    `part` is the island, as in `newton_contacts`.
+    """
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(
             g,
@@ -140,7 +149,7 @@ def _accept_trial(part, many):
 
 @inlined
 def _restore_impulses(part, many):
-    """Restore the best impulses so far."""
+    """Restore the best impulses so far of the island `part`, and the twists that they cause."""
     for g in range(many.counts[NUM_BATCHES]):
         of.put_batch_vector(g, of.PROX_IMPULSE, of.batch_vector(g, of.PROX_BEST, many), many)
     _apply_impulses(part, many)
@@ -148,7 +157,11 @@ def _restore_impulses(part, many):
 
 @kernel
 def _proximal_round(part, rho, enough, limit, many):
-    """Solve x = M⁻¹ Jᵀ p(x) to `enough` [m/s] by Newton steps; p(x) goes into `contacts.impulse` and the twists."""
+    """Do one proximal round: solve x = M⁻¹ Jᵀ p(x) by Newton steps, and take over the impulses p(x).
+
+    It stops at a defect of at most `enough` [m/s], or after `limit` steps. Returns the number of steps. `part` is as in
+    `newton_contacts`, `rho` the penalty ρ [kg].
+    """
     norm, worst = compute_defect(part, rho, False, many)
     steps = failures = 0
     while worst > enough and steps < limit and failures <= FAILED_STEPS:
@@ -163,7 +176,7 @@ def _proximal_round(part, rho, enough, limit, many):
 
 @inlined
 def _heaviest(part, many):
-    """Largest mass among the bodies of the problem [kg]."""
+    """Largest mass among the bodies of the island `part` [kg]."""
     mass = 0.0
     for i in range(part[2], part[3]):
         mass = max(mass, many.bodies.body[many.islands.bodies[i]].mass)
@@ -172,10 +185,11 @@ def _heaviest(part, many):
 
 @kernel
 def prepare_system(part, sweeps, worth, fewest, many):
-    """Order the bodies for the linear system; return the iterations that an island is worth, 0 if it costs too much.
+    """Order the bodies of an island for its linear system, and batch its contacts; return the affordable iterations.
 
-    A problem with so many sweeps allowed is worth `worth` times their cost. It costs too much if that pays for fewer
-    than `fewest` iterations. This is known before much is computed.
+    The iterations may cost `worth` times as much as the allowed number of `sweeps`. Returns 0 if that pays for fewer
+    than `fewest` iterations, which is known before much is computed, or if the system finds no room. `part` is as in
+    `newton_contacts`.
     """
     first, last, begin, end = part
     contacts, worth = (last - first) * _CONTACT_COST, worth * sweeps * (last - first) * _SWEEP_COST
@@ -187,7 +201,7 @@ def prepare_system(part, sweeps, worth, fewest, many):
 
 @inlined
 def save_best(part, many):
-    """Save the present impulses as the best of all methods."""
+    """Save the present impulses of the island `part` as the best that any method has found."""
     for i in range(part[0], part[1]):
         put_vector(
             many.contacts.best_impulse,
@@ -199,7 +213,7 @@ def save_best(part, many):
 
 @inlined
 def restore_best(part, many):
-    """Restore the best impulses of all methods, and the twists that they cause."""
+    """Restore the best impulses that any method has found for the island `part`, and the twists they cause."""
     for i in range(part[2], part[3]):
         for c in range(TWIST_DOFS):
             many.bodies.twist[many.islands.bodies[i], c] = many.bodies.free_twist[many.islands.bodies[i], c]
@@ -211,7 +225,7 @@ def restore_best(part, many):
 
 @inlined
 def is_every_contact_pushing(part, many):
-    """True if all contacts of an island push; else they cannot all stick."""
+    """True if all contacts of the island `part` push; else they cannot all stick."""
     for i in range(part[0], part[1]):
         if not many.contacts.impulse[many.islands.contacts[i], 0] > 0.0:
             return False
@@ -220,10 +234,12 @@ def is_every_contact_pushing(part, many):
 
 @kernel
 def try_all_sticking(part, friction, residual, enough, many):
-    """Try impulses with every contact sticking, and keep them if the residual falls; return it, `enough` at best [m/s].
+    """Try impulses with every contact sticking, and keep them if the residual falls; return the residual [m/s].
 
-    The law is then linear, so its matrix is factored once, and a few rounds of q = p(x) cost little more than one. A
-    resting stack is solved so far below the goal that the next steps find nothing to do.
+    It stops at a residual of at most `enough` [m/s]. If all contacts stick, the impulses p(x) of the module are linear
+    in x. So the matrix is factored once, and a few rounds cost little more than one. A resting stack is solved so far
+    below the tolerance that the next steps find nothing to do. `part` and `friction` are as in `newton_contacts`;
+    `residual` is that of the start.
     """
     first, last, begin, end = part
     rho = _STICK_RHO * _heaviest(part, many)
@@ -248,26 +264,32 @@ def try_all_sticking(part, friction, residual, enough, many):
 
 @kernel
 def newton_contacts(part, friction, residual, goal, limit, scale, many):
-    """Improve the impulses of an island until the residual is within `goal` [m/s].
+    """Improve the impulses of an island by proximal rounds until the residual is at most `goal`.
 
     Parameters
     ----------
     part : tuple of 4 ints
-        Its contacts `islands.contacts[part[0]:part[1]]` and bodies `islands.bodies[part[2]:part[3]]`.
-        `contacts.impulse` is the start, `bodies.free_twist` the twists without any impulse; `contacts.impulse` and
-        `bodies.twist` receive the best result.
-    residual, goal : float
-        Residual of the start, and tolerance [m/s].
+        Island with contacts `islands.contacts[part[0]:part[1]]` and bodies `islands.bodies[part[2]:part[3]]`.
+    friction : bool or None
+        None if the scene has no friction.
+    residual : float
+        Residual of the start [m/s].
+    goal : float
+        Residual to reach [m/s].
     limit : int
-        Newton steps at most.
+        Largest number of Newton steps.
     scale : float
         ρ of the first round, in units of the largest mass.
+    many : BodiesWorkspace
+        Workspace of the world. `contacts.impulse` is the start, `bodies.free_twist` the twists without impulses.
+        `contacts.impulse` and `bodies.twist` receive the best result.
 
     Returns
     -------
     steps : int
+        Number of Newton steps.
     residual : float
-        [m/s], measured on what is returned.
+        Residual of the returned impulses [m/s].
     """
     mass, failures, steps = _heaviest(part, many), 0, 0
     _gather_impulses(many)

@@ -1,27 +1,28 @@
-"""Solve the contact problem of all bodies of a world at once, by a choice of methods, and report it.
+"""Solve the contact problem of all bodies of a world by a choice of methods, and report the method.
 
-A warm start that still solves the problem costs one look at the residual. Else the contacts fall into islands
-(`islands`), and each that is not solved yet takes, in this order, as far as it is needed:
+If the warm start solves the problem, only its residual is computed. Else the contacts are sorted into islands
+(`islands`). An island that is not solved yet takes these methods in turn, until one reaches the tolerance:
 
-1. where there is one contact one sweep, which is exact then;
-2. the guess that everything holds, unless the warm start says otherwise or, where there is none, contacts part by
-   themselves: one linear system, the answer for what stands still, far below what is asked; once more after 3, where
-   all contacts push only then;
-3. a few sweeps, the answer for what meets and parts;
-4. an interior-point method, which finds what holds, slides and opens whatever the start, and Newton's method on the
-   twists from there, in turns;
-5. sweeps up to their limit, from the best that was met.
+1. An island of one contact takes one sweep, which is exact then.
+2. Try all contacts as sticking, by one linear system. This solves resting islands far below the tolerance. It is left
+   out if some, but not all, contacts of the warm start push, or if none does and contacts open. It is then tried after
+   3, if all contacts push by then.
+3. A few sweeps, which solve impacts and separations.
+4. An interior-point method, which finds sticking, sliding and opening contacts from any start, and Newton's method on
+   the twists from its result, in turns.
+5. Sweeps up to their limit, from the best impulses so far.
 
-An impact that is not to be solved finely begins with sweeps up to their limit: few contacts have anything to do in it.
+An impact with a coarse tolerance begins with sweeps up to their limit, since few of its contacts change.
 
-In a resting stage, what is nearly at rest is solved a little further (`near_rest_refinement`).
+In a resting stage, islands that are nearly at rest are solved below the tolerance (`near_rest_refinement`).
 
-What has a residual then that no impulses at all would beat, or a stress beyond reason, is solved without friction.
+An island is solved without friction if its residual is larger than that of no impulses at all, or if its impulses are
+unreasonably large.
 
-Where the linear system is dear for what it is worth (`proximal_newton.prepare_system`: many bodies that all lie on each
-other, and move), sweeps up to their limit take the place of 2 to 5, so that what a step costs is in proportion to its
-contacts; what they leave is reported. Iterations with the system are at most the sweeps allowed, either, but for those
-of the last method begun.
+If the linear system is too expensive (`proximal_newton.prepare_system`: many moving bodies that all lie on each other),
+sweeps up to their limit take the place of 2 to 5. So the cost of a step is in proportion to its contacts, and a
+residual above the tolerance is reported. Iterations with the linear system are at most as many as the allowed sweeps,
+except those of the last method begun.
 """
 
 from __future__ import annotations
@@ -58,46 +59,48 @@ from physics.kernels.multibody.solver.proximal_newton import (
 )
 from physics.kernels.state.layout import METHOD_NEWTON, METHOD_SWEEPS
 
-# Share of the tolerance, or of this finer one, relative to the largest free velocity, that the guess that all
-# holds is solved to: what stands finds nothing to do in the steps to come.
+# Islands in which all contacts stick are solved to this share of the goal, or of this finer tolerance, whichever is
+# less. So a resting island finds nothing to do in the steps to come.
 STICKING_SHARE = 1.0e-3
 FINE_TOLERANCE = 1.0e-6
 
 # Sweeps before the interior-point method.
 FIRST_SWEEPS = 5
 
-# A pile nearly lies where without impulses no contact would be faster than this many times what loads give in the
-# stage.
+# An island is nearly at rest if without impulses no contact would be faster than this many times the speed that loads
+# give in the stage.
 _RESTING_FACTOR = 3.0
 
-# Tolerance from which on impacts are swept first.
+# Tolerance at and above which impacts are swept first.
 _COARSE_TOLERANCE = 1.0e-4
 
-# Residual that rounding leaves, relative to the largest free velocity: the smallest tolerance.
+# Residual that rounding leaves, relative to the largest free velocity; smaller tolerances are raised to it.
 _MIN_TOLERANCE = 1.0e-12
 
-# Where bodies of one velocity touch, all that is left to solve is the rounding of that velocity, and nothing can be
-# solved relative to it: u is the difference of two sums v + ω x r of three products and three terms each, every one of
-# them rounded, which makes 2 · 6 · ε of the largest, and the impulses round the velocities once more.
+# Rounding of a relative velocity u, as a share of the bodies' speed. If bodies of the same velocity touch, u is nothing
+# but rounding, and no residual can be small relative to it. u is the difference of two sums v + ω x r of three products
+# and three terms each, all of them rounded, which makes 2 · 6 · ε of the largest. The impulses round the velocities
+# once more.
 _VELOCITY_ROUNDING = 16 * 2.0**-52
 
-# An impulse is rounded, too, and with it the velocities, by up to this share of what it alone would give its bodies
-# (half an ulp in it, in its moment, and in each of the sums): a light cube under a heavy one can be at rest no better.
+# Rounding of velocities by an impulse, as a share of the speed that the impulse alone would cause (half an ulp in the
+# impulse, in its moment, and in each of the sums). So a light cube under a heavy one keeps a residual of that size.
 _IMPULSE_ROUNDING = 2 * 2.0**-52
 
-# Bodies that wedge by friction hold any stress. Impulses that alone would give this many times the free velocities are
-# one that a method ran into, not what holds a million times a body's weight: what they leave is rounding.
+# Largest speed that an impulse alone may cause, in units of the free velocities. Bodies that wedge by friction hold any
+# stress, and a method may run into a huge one, whose residual is mere rounding. The limit still allows impulses that
+# hold a million times a body's weight.
 _STRAIN_LIMIT = 1.0e9
 
-# Sweeps without friction, where all else failed.
+# Largest number of sweeps without friction, after all other methods have failed.
 _FALLBACK_SWEEPS = 100
 
-# Residual at which the interior-point method gives way to Newton's at the latest, relative to the largest velocity
-# without impulses: below it, rounding does.
+# Residual at which the interior-point method gives way to Newton's method, relative to the largest velocity without
+# impulses. Below it rounding decides.
 _INTERIOR_TOLERANCE = 1.0e-6
 
-# Iterations of the first in a turn, steps of the second, and its ρ in units of the largest mass. Each turn goes on from
-# the impulses that the one before ended with, the last one from none.
+# Largest numbers of interior-point iterations and of Newton steps in each turn, and ρ of Newton's method in units of
+# the largest mass. Each turn starts from the impulses of the turn before, the last one from zero.
 _INTERIOR_STEPS = (30, 30, 40)
 _NEWTON_STEPS = (20, 40, 40)
 NEWTON_RHO = (10.0, 1.0, 1.0)
@@ -105,7 +108,7 @@ NEWTON_RHO = (10.0, 1.0, 1.0)
 
 @inlined
 def save_free_twists(many):
-    """Save the present twists, without any impulse (`many.bodies.free_twist`)."""
+    """Save the present twists of all bodies as those without contact impulses, in `many.bodies.free_twist`."""
     for b in range(many.bodies.twist.shape[0]):
         for c in range(TWIST_DOFS):
             many.bodies.free_twist[b, c] = many.bodies.twist[b, c]
@@ -113,14 +116,17 @@ def save_free_twists(many):
 
 @inlined
 def reset_body_to_free(b, many):
-    """Reset the twist of body b to that without any impulse."""
+    """Reset the twist of body b to the one without contact impulses."""
     for c in range(TWIST_DOFS):
         many.bodies.twist[b, c] = many.bodies.free_twist[b, c]
 
 
 @inlined
 def clear_island_impulses(part, many):
-    """Clear the impulses of an island."""
+    """Set the impulses of the island `part` to zero, and its twists to those without impulses.
+
+    `part` is as in `proximal_newton.newton_contacts`.
+    """
     for i in range(part[0], part[1]):
         put_vector(many.contacts.impulse, many.islands.contacts[i], 0, (0.0, 0.0, 0.0))
     for i in range(part[2], part[3]):
@@ -129,7 +135,7 @@ def clear_island_impulses(part, many):
 
 @inlined
 def clear_all_impulses(n, many):
-    """Clear all impulses."""
+    """Set the impulses of the n contacts to zero, and all twists to those without impulses."""
     for k in range(n):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
     for b in range(many.bodies.twist.shape[0]):
@@ -138,7 +144,12 @@ def clear_all_impulses(n, many):
 
 @kernel
 def alternate_second_order(part, friction, scale, residual, goal, limit, many):
-    """Alternate interior point and Newton's method: (iterations, residual)."""
+    """Improve the impulses of an island by interior-point and Newton's method in turns: (iterations, residual [m/s]).
+
+    `scale` is the speed that residuals are relative to, `residual` that of the start, and `goal` the residual to reach,
+    all in m/s. There are at most `limit` iterations, except those of the last method begun. The best impulses are kept.
+    `part` and `friction` are as in `proximal_newton.newton_contacts`.
+    """
     count, best, start, last = 0, residual, residual, len(NEWTON_RHO) - 1
     save_best(part, many)
     for turn in range(last + 1):
@@ -165,7 +176,11 @@ def alternate_second_order(part, friction, scale, residual, goal, limit, many):
 
 @kernel
 def sweep_as_fallback(part, friction, residual, goal, limit, many):
-    """Sweep from the best impulses so far, and keep the better ones: (sweeps, residual)."""
+    """Improve the best impulses of an island by sweeps, and keep the better of both: (sweeps, residual [m/s]).
+
+    `residual` is that of the start, `goal` the residual to reach [m/s], `limit` the number of sweeps allowed. `part`
+    and `friction` are as in `proximal_newton.newton_contacts`.
+    """
     save_best(part, many)
     count, now = sweep_contacts(part[0], part[1], friction, residual, goal, limit, many)
     if not now < residual:
@@ -176,7 +191,7 @@ def sweep_as_fallback(part, friction, residual, goal, limit, many):
 
 @inlined
 def is_island_inactive(part, goal, many):
-    """True if no contact of an island pushes, and none opens faster than `goal` [m/s] without impulses."""
+    """True if no contact of the island `part` pushes, and none opens faster than `goal` [m/s] without impulses."""
     for i in range(part[0], part[1]):
         k = many.islands.contacts[i]
         if many.contacts.impulse[k, 0] > 0.0 or velocity_error(k, many)[0] > goal:
@@ -186,9 +201,10 @@ def is_island_inactive(part, goal, many):
 
 @inlined
 def _is_swept_first(part, goal, scale, many):
-    """True if an island is first solved by sweeps: it has one contact, or an impact at a coarse tolerance.
+    """True if the island `part` is first solved by sweeps: it has one contact, or is in a coarsely solved impact.
 
-    An impact starts without impulses, and involves only the few contacts near it.
+    `goal` is the residual to reach, `scale` the speed it is relative to [m/s]. Impacts are swept first if their
+    tolerance is coarse. They start without impulses, and involve only the few contacts near them.
     """
     is_impact = many.settings[0].is_resting_stage == 0
     return part[1] - part[0] == 1 or (is_impact and goal >= _COARSE_TOLERANCE * scale)
@@ -196,9 +212,11 @@ def _is_swept_first(part, goal, scale, many):
 
 @kernel
 def solve_island(part, friction, scale, residual, goal, deep, many):
-    """Solve one island from impulses of the given residual [m/s]: (iterations, residual, method).
+    """Solve the contact problem of one island: (iterations, residual [m/s], method).
 
-    Islands of sticking contacts are solved to `deep` [m/s].
+    `residual` is that of the impulses to start from, `goal` the residual to reach, and `scale` the speed that residuals
+    are relative to, all in m/s. If all contacts stick, the island is solved to `deep` [m/s]. `part` and `friction` are
+    as in `proximal_newton.newton_contacts`.
     """
     first, last, _, _ = part
     limit, count = many.settings[0].sweeps, 0
@@ -237,7 +255,10 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
 
 @inlined
 def max_impulse_speed(first, last, many):
-    """Largest speed that a contact's impulse alone would cause [m/s]."""
+    """Largest speed that the impulse of one contact alone would cause at it [m/s].
+
+    The contacts are `many.islands.contacts[first:last]`.
+    """
     most = 0.0
     for i in range(first, last):
         k = many.islands.contacts[i]
@@ -248,7 +269,7 @@ def max_impulse_speed(first, last, many):
 
 @inlined
 def max_body_speed(many):
-    """Bound of the speed of any point of the bodies with neighbours [m/s]."""
+    """Bound of the speed of any point of the bodies in contact [m/s]."""
     most = 0.0
     for b in range(many.bodies.twist.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -259,9 +280,11 @@ def max_body_speed(many):
 
 @kernel
 def solve_island_frictionless(part, friction, goal, many):
-    """Solve for impulses along the normals only, from none; return the residual of the problem with friction [m/s].
+    """Solve an island for impulses along the normals only; return its residual with friction [m/s].
 
-    This is the last resort, after the methods for friction have failed: these sweeps never raise the energy.
+    This is the last resort, after the methods for friction have failed: the sweeps start from zero impulses, and never
+    raise the energy. `part` and `friction` are as in `proximal_newton.newton_contacts`; `goal` is the residual to reach
+    [m/s].
     """
     first, last, _, _ = part
     clear_island_impulses(part, many)
@@ -271,7 +294,10 @@ def solve_island_frictionless(part, friction, goal, many):
 
 @shared_kernel
 def solve_all_frictionless(n, many):
-    """Do `solve_island_frictionless` for all contacts, when friction found no solution; return the residual [m/s]."""
+    """Solve all n contacts for impulses along the normals only; return the residual without friction [m/s].
+
+    This is the last resort, after a solve with friction has created energy.
+    """
     save_free_twists(many)
     clear_all_impulses(n, many)
     goal = many.settings[0].tolerance * assemble_contact_blocks(n, many)
@@ -280,13 +306,15 @@ def solve_all_frictionless(n, many):
 
 @shared_kernel
 def solve_contacts(n, friction, many):
-    """Solve for `many.contacts.impulse` from the warm start in it: (iterations, relative residual, method).
+    """Solve for the impulses of the n contacts, from the warm start: (iterations, relative residual, method).
 
-    `many.bodies.twist` holds the velocities without contact impulses, and receives those with them. The residual is
-    measured on the returned impulses, relative to a speed. This speed is the largest velocity that a contact would have
-    without impulses. If all of those are close to rounding, it is the speed at which the tolerance equals the rounding
-    of velocities or impulses. In a part of a substep it is the speed that loads give in half of it
-    (`adaptive_substep`). Iterations are the largest number of any island.
+    `many.contacts.impulse` holds the warm start and receives the result. `many.bodies.twist` holds the velocities
+    without contact impulses and receives those with them. `friction` is None if the scene has no friction.
+
+    Iterations are the largest number of any island. The residual is that of the returned impulses, relative to a speed:
+    the largest velocity error that a contact would have without impulses. If all of these are close to rounding, it is
+    the speed at which the tolerance equals the rounding of velocities or impulses. Under error control it is at least
+    the speed that loads give in half a substep (`adaptive_substep`).
     """
     save_free_twists(many)
     tolerance = many.settings[0].tolerance

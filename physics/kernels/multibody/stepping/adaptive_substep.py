@@ -1,11 +1,13 @@
-"""Error control of a substep: it is cut into parts that agree with two of half their length.
+"""Error control of a substep: it is cut into parts, and each part is compared with two steps of half its length.
 
-Impacts are met in time by a part of any length (`impact`). What is not, and makes an error of first or second order in
-the part where it happens: contacts that open, begin to slip or hold; slow meetings; and contacts whose problem has
-another answer. Halving finds all of them, and what moves smoothly is of second order in between.
+Impacts need no short parts: the stages of a part end at the time of impact (`impact`). Other changes of contact cause
+an error of first or second order in the part in which they happen: contacts that open, begin to slip or begin to stick,
+slow impacts, and contact problems whose solution jumps to another one. Halving the part resolves all of them. Between
+such changes the motion is smooth, and the method is of second order.
 
-Parts are `whole`, 1/2, 1/4, ... of the substep, at multiples of their length, so that a part that is refused begins
-with the first half of it, which is known already. A part that is good for twice its length is followed by one.
+Lengths of parts are 1, 1/2, 1/4, ... of the substep, and a part begins at a multiple of its length. So when a part is
+refused, its first half is the next one to try, and its single step is known already. After an accepted part the next
+one is twice as long, if that fits.
 """
 
 from __future__ import annotations
@@ -20,32 +22,37 @@ from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, are_all_finite, read_state
 
-# A substep in its shortest parts.
+# Units in a substep. The shortest part is one unit long at first.
 _UNITS_PER_SUBSTEP = 2**24
 
-# Error that a part may have, in tolerances of the contact problem: what is left of that in one part, as a velocity, is
-# some of them, and no shorter part shows less.
+# Allowed error of a part, in tolerances of the contact problem. The residual of a solve changes velocities by a few
+# tolerances, however short the part is.
 ERROR_PER_TOLERANCE = 100.0
 
-# Where the shortest part does not meet the error, or after so many parts tried, those of the rest of the substep are no
-# shorter than four times it: what has no limit, and what rattles without end, takes no end of parts. There are 12 such
-# lengths, so that this ends after some 600 trials; the longer a part, the later it is refused for this reason.
+# If the shortest part is above the allowed error, or after so many trials, the shortest part becomes this many times
+# longer for the rest of the substep. Otherwise motion that rattles without end would take parts without end. There are
+# 12 such lengths, so that a substep ends after some 600 trials.
 _COARSENING_FACTOR = 4
 _MAX_TRIALS = 50
 
-# Tolerance of the contact problems of many bodies, and slop in bounding radii, below which rounding would decide.
+# Least tolerance of contact problems of many bodies, and least slop in bounding radii: below them rounding would
+# decide.
 MIN_SOLVER_TOLERANCE = 1.0e-11
 MIN_RELATIVE_SLOP = 1.0e-12
 
 # Rounding of a position, in units of its last place.
 _POSITION_ROUNDING = 16.0 * 2.0**-52
 
+# Index of a snapshot: at the start of a part, after its single step, after the first of its two half steps.
 SNAPSHOT_START, SNAPSHOT_COARSE, SNAPSHOT_MIDDLE = range(3)
 
 
 @inlined
 def _save_snapshot(slot, world, kept, memory, report, many, counts):
-    """Save the present state of the world."""
+    """Save the present state of the world in `kept`, at index `slot` (`SNAPSHOT_START` ...).
+
+    A snapshot has the states of the bodies, the world's rows of `memory` and `report`, and its counts of events.
+    """
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
             kept.state[slot, b, c] = many.bodies.state[b, c]
@@ -59,9 +66,9 @@ def _save_snapshot(slot, world, kept, memory, report, many, counts):
 
 @inlined
 def _restore_snapshot(slot, world, kept, memory, report, many, counts):
-    """Restore the saved state of the world, except the counts of the report.
+    """Restore the state of the world from `kept`, at index `slot`, except solves and iterations in the report.
 
-    Events logged since then are dropped: their rows are overwritten.
+    Events logged since the snapshot are dropped: later events overwrite their rows.
     """
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
@@ -82,9 +89,11 @@ def _length(a):
 
 @inlined
 def _body_error(b, offset_frame, kept, many):
-    """Distance of body b from its state `SNAPSHOT_COARSE`, in its radius; and the difference in velocity, in its speed.
+    """Error of body b: difference between its present state and that of the snapshot `SNAPSHOT_COARSE`.
 
-    The speed counts as at least the speed that the body's loads give it over its radius.
+    It is the larger of two ratios. One is the largest distance between points of the body in the two poses, in bounding
+    radii. The other is the difference in velocity relative to the body's speed. That speed counts as at least √(r a):
+    the one that loads of acceleration a give over a bounding radius r.
     """
     body = many.bodies.body[b]
     x, q, v, L = read_state(many.bodies.state, b)
@@ -104,7 +113,7 @@ def _body_error(b, offset_frame, kept, many):
 
 @inlined
 def _max_body_error(offset_frame, kept, many):
-    """Largest error of any body, as a multiple of the allowed one."""
+    """Largest error of any body (`_body_error`), as a multiple of the allowed error."""
     worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
     for b in range(many.bodies.state.shape[0]):
         found = _body_error(b, offset_frame, kept, many) / allowed
@@ -115,7 +124,7 @@ def _max_body_error(offset_frame, kept, many):
 
 @kernel
 def _step_part(world, start, h, switches, records, many):
-    """Take one part of h [s], `start` [s] after the call."""
+    """Advance the world by one part of h [s], which starts `start` [s] after the start of the call."""
     for b in range(many.bodies.state.shape[0]):
         set_clock(start, many.bodies.body[b])
         many.bodies.touched[b] = 0
@@ -124,7 +133,12 @@ def _step_part(world, start, h, switches, records, many):
 
 @kernel
 def _step_with_halving(world, start, unit, part, shortest, switches, kept, records, many):
-    """Advance by `part` units of time [s], or a half, a quarter ... of it: (units taken, error, lengths tried)."""
+    """Advance the world by a part whose error is allowed: (units taken, its error, number of lengths tried).
+
+    A unit is `unit` [s]. The first length tried is `part` units; while the error is above 1, in multiples of the
+    allowed one, the length is halved, down to `shortest` units. The accepted state is that after two half steps.
+    `start` is the time since the start of the call [s].
+    """
     offset_frame, tried = switches.flight.offset_frame, 1
     _save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
     _step_part(world, start, part * unit, switches, records, many)
@@ -140,17 +154,17 @@ def _step_with_halving(world, start, unit, part, shortest, switches, kept, recor
             return part, error, tried
         _restore_snapshot(
             SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts
-        )  # the coarse answer of the first half
+        )  # the single step over the first half, which is tried next
         part //= 2
         tried += 1
 
 
 @inlined
 def _min_load_speed(h, many):
-    """Least speed that a body gains by its loads in h [m/s].
+    """Least speed that loads give to a body in a time h [s], over all bodies [m/s].
 
-    The solves of a part are at least as coarse as those of the halves in which every substep is taken. A finer goal
-    would be below the rounding of bodies that turn on edges, and no error is as small.
+    It is the smallest scale of contact problems under error control. Solves in short parts are then as coarse as in
+    half a substep. A finer goal would be below the rounding of bodies that turn on edges.
     """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
@@ -160,16 +174,31 @@ def _min_load_speed(h, many):
 
 @kernel
 def step_with_error_control(world, start, h, switches, kept, records, many):
-    """Advance the bodies of one world by h [s], `start` [s] after the call, in parts that meet the error.
+    """Advance the bodies of one world by a substep of h [s], in parts whose error is allowed.
 
-    If the shortest part does not meet the error either, it counts as a fallback, and the shortest part is longer for
-    the rest of this substep.
+    Parameters
+    ----------
+    world : int
+        Index of the world.
+    start : float
+        Time since the start of the call [s].
+    h : float
+        Length of the substep [s].
+    switches : MultibodySwitches
+        Effects that are compiled in.
+    kept : WorldSnapshots
+        Room for snapshots, from `allocation.make_snapshots`.
+    records : Records
+        Warm starts, reports and logs. The last column of `records.memory` keeps the length of the next part.
+    many : BodiesWorkspace
+        Scratch memory, with the state of the world.
 
-    `switches` are `MultibodySwitches`; `kept` is what `allocation.make_snapshots` makes.
+    If the shortest part is above the allowed error, too, it is accepted and reported as a fallback. The shortest part
+    is then longer for the rest of this substep.
     """
     place, shortest, unit, patience = 0, 1, h / _UNITS_PER_SUBSTEP, _MAX_TRIALS
     next_part = records.memory.shape[1] - 1
-    many.settings[0].half_load_speed = _min_load_speed(0.5 * h, many)  # the scale of contact problems, at least
+    many.settings[0].half_load_speed = _min_load_speed(0.5 * h, many)  # least scale of contact problems
     part = int(records.memory[world, next_part] * _UNITS_PER_SUBSTEP)
     if part == 0:
         part = _UNITS_PER_SUBSTEP
@@ -186,6 +215,6 @@ def step_with_error_control(world, start, h, switches, kept, records, many):
             shortest, patience = min(_COARSENING_FACTOR * shortest, _UNITS_PER_SUBSTEP), _MAX_TRIALS
         part = min(
             2 * part, _UNITS_PER_SUBSTEP
-        )  # what rounding leaves is no reason to stay with short ones: it is always tried
+        )  # double length is always tried: an error near rounding must not keep parts short
         records.memory[world, next_part] = part / _UNITS_PER_SUBSTEP
         part = min(part, place & -place)

@@ -1,11 +1,13 @@
 """Safe times of free flight for bodies that turn far in a stage, near walls and each other.
 
-`physics.kernels.half_space.conservative_advancement` for many bodies: along a direction n, out of b, a and b are apart
-after t by at least
+The same method as `physics.kernels.half_space.conservative_advancement`, for pairs of bodies a and b. Let x be their
+geometric centres, v the velocities of these centres, ω the angular velocities, s the support functions, and A a bound
+of the acceleration of a body's points. For a direction n out of b, the gap after a time t is at least
 
-    n·(x_a - x_b) + t n·(v_a - v_b) - s_a(-k_a) - s_b(k_b) - (a_a + a_b) t²/2,    k = n + t (n x ω),
+    n·(x_a - x_b) + t n·(v_a - v_b) - s_a(-k_a) - s_b(k_b) - (A_a + A_b) t²/2,    k = n + t (n x ω),
 
-which is concave in t. The direction is that in which they are nearest (`gjk`), found again after each advance.
+which is concave in t. The bodies are flown to a time before its zero, and the direction n in which they are nearest is
+found again by `gjk` after each advance.
 """
 
 from __future__ import annotations
@@ -41,22 +43,23 @@ from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
-# Turn from which bodies are looked at under error control [rad]: of a body that turns by less within a part the
-# points are off the line along which contacts are foretold by θ²/8 of its radius, 1.3e-3. A part of longer turns that
-# meets something differs from its halves if these do not, and is refused.
+# Turn from which a body turns far under error control [rad]. A point of a body that turns by θ leaves the straight line
+# along which contacts are predicted by θ²/8 of its radius, 1.3e-3. If a longer turn misses a contact that shorter parts
+# find, the results differ and the part is refused.
 _MIN_TURN = 0.1
 
-# Share of `data.contact_set.arrival_gap` to which they are flown: a contact's gap is along its own normal, which may be
-# 11 degrees off, and none must be left to the other's care.
+# Share of `data.contact_set.arrival_gap` to which a pair is flown. The gap of a contact is along its own normal, which
+# may be 11 degrees off the direction used here, and must be found to have arrived, too.
 _ARRIVAL_FRACTION = 0.5
 
 
 @inlined
 def write_spin_bounds(h, offset_frame, many):
-    """Write `many.bodies.spin_bound`: bounds of |ω| of bodies that may turn far in h, else 0; return whether any may.
+    """Write bounds of |ω| [rad/s] for bodies that may turn far within h [s], 0 for others; return whether any may.
 
-    A cheap test settles most bodies. Loads turn a body by at most h times its acceleration over its radius. While it
-    turns by less than `FAR_TURN`, its spin grows by less than a factor of √2 (see
+    The bounds are written to `many.bodies.spin_bound`. `offset_frame` is a switch of `state.groups.FlightSwitches`. A
+    cheap test settles most bodies: loads raise |ω| by at most h times a body's acceleration over its radius. While a
+    body turns by less than `FAR_TURN`, its spin grows by less than a factor of √2 (see
     `conservative_advancement.spin_bound`).
     """
     least, found = FAR_TURN, False
@@ -77,7 +80,7 @@ def write_spin_bounds(h, offset_frame, many):
 
 @kernel
 def _write_spin_bound(b, h, least, offset_frame, many):
-    """Write `many.bodies.spin_bound` of one body; return whether it turns far."""
+    """Write `many.bodies.spin_bound` of body b; return whether it may turn by more than `least` [rad] within h [s]."""
     _, q, _, L = read_state(many.bodies.state, b)
     if not may_turn(L, h, least, offset_frame, many.bodies.body[b]):
         return False
@@ -90,14 +93,19 @@ def _write_spin_bound(b, h, least, offset_frame, many):
 
 @inlined
 def clear_spin_bounds(many):
-    """Clear all bounds: no body turns far."""
+    """Clear the spin bounds: every body then counts as one that does not turn far."""
     for b in range(many.bodies.state.shape[0]):
         many.bodies.spin_bound[b] = 0.0
 
 
 @inlined
 def _contact_side(b, y, n, offset_frame, many):
-    """(geometric centre, rotation, its arm, velocity along n, n x ω) of body b in state y; a sphere's ω is left out."""
+    """Data of body b in a state y for `_gap_bound` along the unit vector n, of which there are five.
+
+    They are the geometric centre, the rotation matrix, the arm from the centre of mass to the geometric centre (world
+    frame), the velocity along n, and n x ω. The last is 0 for a sphere about its centre of mass, whose rotation moves
+    no surface.
+    """
     x, q, v, L = y
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if offset_frame is not None:
@@ -109,7 +117,10 @@ def _contact_side(b, y, n, offset_frame, many):
 
 @inlined
 def _support(b, R, k, hulls, many):
-    """Reach of body b along k from its geometric centre, in |k|."""
+    """Support function of body b along the vector k of any length: the largest k·r over its points r.
+
+    The points r are relative to its geometric centre; R is the body's rotation matrix.
+    """
     d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
@@ -120,7 +131,11 @@ def _support(b, R, k, hulls, many):
 
 @kernel
 def _gap_bound(t, a, b, n, sides, rate, bend, hulls, many):
-    """Bound of the gap between body a and body b, or wall -1 - b, along n after t [m]; see the module."""
+    """Lower bound of the gap between body a and body b, or wall -1 - b, along n after t [s] of free flight [m].
+
+    It is the formula of the module. `sides` are the results of `_contact_side` for a and b, `rate` is the relative
+    velocity along n [m/s], and `bend` the bound of the relative acceleration [m/s²].
+    """
     one, other = sides
     x, R, c, _, m = one
     k = turned_normal(n, m, t)
@@ -139,7 +154,11 @@ def _norm(m):
 
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
-    """Time within which the gap along n cannot close, at most `horizon` [s]."""
+    """Time within which the gap of body a and body b, or wall -1 - b, along n cannot close, at most `horizon` [s].
+
+    `one` and `other` are the results of `_contact_side` for a and b; `bend` is the bound of the relative acceleration
+    of their points [m/s²].
+    """
     rate, turning = one[3], many.bodies.body[a].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
@@ -172,7 +191,7 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 
 @inlined
 def _turning_acceleration(b, h, offset_frame, many):
-    """Bound of the acceleration of a point of body b by turning within h [m/s²]."""
+    """Bound of the acceleration [m/s²] that the rotation of body b gives to its points within h [s]."""
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
@@ -182,17 +201,18 @@ def _turning_acceleration(b, h, offset_frame, many):
 
 @inlined
 def _load_acceleration(b, n, many):
-    """Acceleration of body b along n [m/s²]."""
+    """Acceleration of body b's centre of mass by its loads, along the unit vector n [m/s²]."""
     g = many.bodies.body[b].free_acceleration
     return n[0] * g[0] + n[1] * g[1] + n[2] * g[2]
 
 
 @kernel
 def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
-    """Time of free flight, at most h, after which a and b (or wall -1 - b) have arrived, or will not [s].
+    """Time that body a can fly freely until it arrives at body b, or wall -1 - b; h if it does not arrive [s].
 
-    The free flight of the bound does not apply to bodies in contact, nor to a pair that touches. These turn at most as
-    far as a test at the end can judge.
+    To arrive is to come within the `arrival_gap`. Bodies in contact do not fly freely, and neither does a pair that
+    touches. For them the result is the time in which they turn by `FAR_TURN`, if it is less than h: a test at the end
+    of the stage then finds any contact.
     """
     touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
     one = read_state(many.bodies.state, a)
@@ -240,7 +260,11 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def safe_stage_length(h, gyroscopic, offset_frame, hulls, many):
-    """Time, at most h, that a stage may take so that no body that turns far passes through another [s]."""
+    """Time, at most h, that a stage may take so that no body that turns far passes through another or a wall [s].
+
+    `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`; `hulls` is None if the scene has
+    none.
+    """
     first = h
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.spin_bound[b] > 0.0:

@@ -1,8 +1,9 @@
 """Energy budget of resting stages and position corrections, where bodies touch each other.
 
-A contact's target that knows how the bodies turn (`midpoint_step.set_resting_targets`) is gainless where bodies answer
-alike in all directions; others, and many contacts together, may gain. To push bodies apart may lift them against their
-loads, which is paid with their motion, and turns them, which changes ½ L·I⁻¹L at the same L. For impacts see
+Targets of resting contacts allow for the rotation of the bodies (`midpoint_step.set_resting_targets`). Such a target
+adds no energy if a body's response to impulses is the same in all directions. Other bodies, and many contacts together,
+may gain energy. Position corrections may lift bodies against their loads, and the work is taken from their motion. They
+also turn bodies, which changes ½ L·I⁻¹L at constant L. For impacts see
 `physics.kernels.contact_law.restitution_energy`.
 """
 
@@ -21,33 +22,39 @@ from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
 
-# Share of its energy of turning that a body gains for nothing by being put right, and slops that it is lifted for
-# nothing. What is lifted pays where walls push: bodies push each other apart in pairs, and keep their momentum.
+# Largest gains of energy that a position correction does not take from the motion: as a share of the body's rotational
+# energy, and as a lift in slops. A larger lift is paid for only in islands that a wall pushes; elsewhere bodies push
+# each other apart and keep their momentum.
 _FREE_ROTATION_SHARE = 1.0e-7
 _FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
 def save_pre_load_velocity(b, velocity, many):
-    """Keep the velocity of body b before its loads act: `velocity`, and the angular velocity in `bodies.twist`."""
+    """Store velocity and angular velocity of body b before its loads act, in `many.bodies.momenta`.
+
+    `velocity` is given [m/s]; the angular velocity is read from `many.bodies.twist`.
+    """
     put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY, velocity)
     put_vector(many.bodies.momenta, b, PRE_LOAD_VELOCITY + 3, row_vector(many.bodies.twist, b, 3))
 
 
 @inlined
 def save_loaded_momenta(b, many):
-    """Keep the momenta of body b with its loads."""
+    """Store velocity and angular momentum of body b after its loads have acted, in `many.bodies.momenta`."""
     put_vector(many.bodies.momenta, b, LOADED_MOMENTA, row_vector(many.bodies.state, b, at.LINVEL))
     put_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3, row_vector(many.bodies.state, b, at.ANGMOM))
 
 
 @kernel
 def has_gained_energy(n, h, many):
-    """True if the impulses of a resting stage of n contacts raised the energy beyond the errors of solve and step.
+    """True if the impulses of the n contacts in a resting stage of length h [s] have created energy.
 
-    Impulses P and moments Q of a body change its energy by ½ P·(v + v') + ½ Q·(ω + ω'). A contact that pushes may keep
-    a residual r = tolerance · s, with the largest free speed s, and so give ½ p r. In a tower this is far more than the
-    energy of its bodies. No contact needs an impulse p above the sum F of all loads to hold them; the rest is strain.
+    Errors of the solve and of the step are allowed for. Impulse P and angular impulse Q on a body change its energy by
+    ½ P·(v + v') + ½ Q·(ω + ω'), from velocities before the stage to v' and ω' after it. A contact with the impulse p
+    may keep a residual r = tolerance · s, with the largest free speed s, and so add ½ p r. In a tower this is far more
+    than the energy of its bodies. But no contact needs an impulse above the sum F of all loads to hold them; the rest
+    of p is internal strain.
     """
     gain = size = fastest = F = 0.0
     for b in range(many.bodies.state.shape[0]):
@@ -81,7 +88,7 @@ def has_gained_energy(n, h, many):
 
 @inlined
 def update_twist(b, offset_frame, many):
-    """Twist of body b from its momenta."""
+    """Compute the twist of body b from its momenta."""
     put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
     q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
     put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], offset_frame))
@@ -89,7 +96,10 @@ def update_twist(b, offset_frame, many):
 
 @kernel
 def revert_to_dissipative(n, offset_frame, many):
-    """Momenta with loads and without impulses, and targets that cannot raise the energy (`midpoint_step`)."""
+    """Undo the impulses of a resting stage, and set targets of its n contacts that cannot raise the energy.
+
+    Bodies get their momenta back that they had before the impulses, with the loads of the stage.
+    """
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 0:
             continue
@@ -102,14 +112,14 @@ def revert_to_dissipative(n, offset_frame, many):
 
 @inlined
 def work_against_loads(b, x, many):
-    """Work against the loads of moving body b from x to its present place [J]."""
+    """Work against its loads that moved body b from position x to its present position [J]."""
     body, y = many.bodies.body[b], row_vector(many.bodies.state, b, at.POS)
     return -body.mass * qt.dot(as_vector(body.free_acceleration), subtract(y, x))
 
 
 @kernel
 def cap_rotational_energy(b, before, offset_frame, many):
-    """Shorten the angular momentum of a turned body if ½L·I⁻¹L would have grown."""
+    """Shorten the angular momentum L of body b if turning it has raised its energy ½ L·I⁻¹L above `before` [J]."""
     _, q, _, L = read_state(many.bodies.state, b)
     after = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     if after > before + _FREE_ROTATION_SHARE * before:
@@ -119,7 +129,7 @@ def cap_rotational_energy(b, before, offset_frame, many):
 
 @kernel
 def take_kinetic_energy(b, price, offset_frame, many):
-    """Take a price [J] from the motion of body b, at most all of it."""
+    """Take the energy `price` [J] from the motion of body b, at most all of it."""
     _, q, v, L = read_state(many.bodies.state, b)
     body = many.bodies.body[b]
     kinetic = 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
@@ -130,17 +140,17 @@ def take_kinetic_energy(b, price, offset_frame, many):
 
 @inlined
 def free_lift_work(b, many):
-    """Work of a lift of body b that costs nothing [J]."""
+    """Work of lifting body b by a few slops [J]; position corrections take no energy for less work than that."""
     body = many.bodies.body[b]
     return body.mass * body.acceleration * _FREE_LIFT_SLOPS * body.slop
 
 
 @kernel
 def clamp_body_inside_walls(b, many):
-    """Bring back a body whose centre is behind a wall, without the velocity that led there: whether it was.
+    """Move body b back inside if its geometric centre is behind a wall; return whether it was.
 
-    Contacts hold points, not centres. Loads of a million times the weight may turn a body by many radians in a step,
-    and its points then say nothing about the way of the centre.
+    The velocity into the wall is removed, too. Contacts hold points of a body, not its centre. Loads of a million times
+    the weight may turn a body by many radians in a step, and its points then do not show where the centre goes.
     """
     body, was_outside = many.bodies.body[b], False
     dims = (body.dims[0], body.dims[1], body.dims[2])

@@ -1,4 +1,4 @@
-"""Impacts: target velocities of contacts where bodies meet, and the time until the next meeting."""
+"""Impacts: target velocities of contacts where bodies meet, and the time until the next impact."""
 
 from __future__ import annotations
 
@@ -19,24 +19,28 @@ from physics.kernels.multibody.data.contact_set import (
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
 
-# A meeting is fast where it would close this share of the smaller body's radius in the time left: it is then met in
-# time, not stopped in front of.
+# An approach is fast if it would close this share of the smaller body's radius in the time left. The stage then ends at
+# the time of impact; a slower approach is braked within the stage.
 _FAST_RADIUS_SHARE = 0.1
 
-# What a free rotation may add to the bound of a point's acceleration, ω² r: its angular velocity changes on the way.
+# Factor of the bound ω² r of a point's acceleration by free rotation, since the angular velocity changes meanwhile.
 TURNING_MARGIN = 2.0
 
-# Slops that something may go in until the resting stage stops it at the middle of the step: a contact problem less.
+# Depth, in slops, that a body may go in until the resting stage stops it at its middle. This saves the contact problem
+# of an impact.
 _SOFT_LANDING_SLOPS = 100.0
 
-# Slops within which contacts that are apart belong to an impact of others; and, of a pair that touches elsewhere, radii
-# of the smaller body by the tolerance: a face that comes back from an impact is tilted by what the solve has left.
+# Gap within which an open contact belongs to an impact of others: in slops, and, if its pair touches elsewhere, in
+# tolerances times the smaller body's radius. A face that comes back from an impact is tilted by the residual of its
+# solve.
 _SAME_MOMENT_SLOPS = 2.0
 _SAME_MOMENT_RADII = 10.0
 
+# Minus the target of a contact that does not close in this stage, and gives no impulse in it.
 _UNCONSTRAINED = 1.0e300
 
-# Target of a contact that is apart and is to be met in time, until the resting stage sets its own.
+# Target of an open contact for which a later stage ends in time, but which pushes on its bodies may close in this one.
+# The resting stage replaces it.
 FORETOLD = -1.0e299
 
 
@@ -44,25 +48,28 @@ FORETOLD = -1.0e299
 def _rest_speed(k, many):
     """Speed that loads give contact k within `rest_share` of the substep [m/s].
 
-    The whole substep counts, even if little of it is left after an impact of others; else such impacts would make
-    resting bodies bounce.
+    The whole substep counts, even if little of it is left after another impact; else such impacts would make resting
+    bodies bounce.
     """
     return many.settings[0].rest_share * relative_acceleration_bound(k, many) * many.settings[0].substep
 
 
 @inlined
 def is_bouncing(k, many):
-    """True if contact k would leave again for longer than `rest_share` of the substep after an impact at its speed."""
+    """True if contact k would rebound from an impact at its present speed.
+
+    A rebound that would be over within `rest_share` of the substep does not count.
+    """
     bounce = -many.contacts.restitution[k] * many.contacts.speed[k]
     return many.contacts.restitution[k] > 0.0 and bounce > _rest_speed(k, many)
 
 
 @inlined
 def rest_speed_limit(k, h, many):
-    """Largest speed that the resting stage may stop [m/s].
+    """Largest approach speed of contact k that a resting stage of length h [s] may stop without an impact [m/s].
 
-    The limit is the speed that loads give within `rest_share` of the substep, or one that closes a few slops until the
-    middle of h.
+    It is the speed that loads give within `rest_share` of the substep, or one that closes a few slops until the middle
+    of the stage, whichever is larger.
     """
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     return max(2.0 * _SOFT_LANDING_SLOPS * slop / h, _rest_speed(k, many))
@@ -70,10 +77,11 @@ def rest_speed_limit(k, h, many):
 
 @inlined
 def impact_speed_limit(k, h, many):
-    """Least speed of contacts to be met in time [m/s]: it closes `_FAST_RADIUS_SHARE` of the smaller radius within h.
+    """Least approach speed of contact k for which a stage must end at the time of impact [m/s].
 
-    Under error control (`adaptive_substep`) every contact that is not slow is met in time. Else parts would be as short
-    as the error in the place of a meeting.
+    This speed closes `_FAST_RADIUS_SHARE` of the smaller body's radius within h [s]. Under error control
+    (`adaptive_substep`) the result is at most `rest_speed_limit`. Otherwise a slow impact would be approached by ever
+    shorter parts, down to the allowed error.
     """
     one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     radius = many.bodies.body[one].radius
@@ -87,7 +95,7 @@ def impact_speed_limit(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """True if contact k, or one after it in the set by steps of `step`, touches and belongs to the same pair."""
+    """True if contact k touches, or any contact of the same pair that comes after it in steps of `step`, 1 or -1."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     least = arrival_gap(a, b, many)
     while 0 <= k < many.counts[NUM_CONTACTS] and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
@@ -99,9 +107,9 @@ def _pair_touches(k, step, many):
 
 @inlined
 def is_left_to_advancement(k, many):
-    """True if `conservative_advancement` finds the time of contact k, because a body turns far.
+    """True if `conservative_advancement` finds the time of impact of contact k, because a body turns far.
 
-    It serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
+    That module serves bodies that are apart. If the pair touches elsewhere, the contact is predicted like any other.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.bodies.spin_bound[a] > 0.0 or (b >= 0 and many.bodies.spin_bound[b] > 0.0)):
@@ -111,7 +119,10 @@ def is_left_to_advancement(k, many):
 
 @inlined
 def is_impact_ahead(k, h, many):
-    """True if contact k is still apart and to be met in time: it bounces, or is fast."""
+    """True if contact k is open and approaches, and the stage must end when it closes: it bounces, or is fast.
+
+    h is the time left of the substep [s].
+    """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     if not (many.contacts.gap[k] > pair_slop(a, b, many) and many.contacts.speed[k] < 0.0):
         return False
@@ -120,10 +131,11 @@ def is_impact_ahead(k, h, many):
 
 @inlined
 def _impact_target(k, h, many):
-    """Target of contact k in an impact, and whether it collides: others may leave it unchanged.
+    """Target of touching contact k in an impact: (normal velocity [m/s], whether the contact causes the impact).
 
-    A leaving contact may be reversed to e times its speed, as in Moreau's law; without this a struck chain could gain
-    energy.
+    A contact that bounces, or that leaves, has the target -e times its speed. For a leaving contact this allows a
+    reversal, as in Moreau's law; without it a struck chain could gain energy. Any other contact has the target 0. h is
+    the time left of the substep [s].
     """
     speed = many.contacts.speed[k]
     if speed > 0.0 or is_bouncing(k, many):
@@ -133,7 +145,12 @@ def _impact_target(k, h, many):
 
 @inlined
 def _distant_target(k, h, is_last, many):
-    """Target of contact k with a gap, and whether it must be braked in the air; unconstrained if met in time."""
+    """Target of open contact k: (normal velocity [m/s], whether the contact must be braked in the air at once).
+
+    The target closes the gap within h [s], the time left of the substep. If a later stage ends at its time of impact,
+    the contact is unconstrained: it gives no impulse in this stage. In the last stage of a substep (`is_last`) this
+    holds for no contact, except those of bodies that turn far.
+    """
     goal = -(many.contacts.gap[k] + parted_slack(k, many)) / h
     if is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many)):
         return -_UNCONSTRAINED, False
@@ -142,11 +159,11 @@ def _distant_target(k, h, is_last, many):
 
 @inlined
 def _is_in_same_moment(k, many):
-    """True if contact k has a gap so small that it belongs to an impact of others.
+    """True if open contact k has a gap so small that it belongs to an impact of other contacts.
 
-    That is within two slops, or, of a pair that touches elsewhere, within what the tolerance makes of the way in the
-    substep, or of some radii: the corners of one face would else hit one after another, each turning the body that the
-    next one turns back.
+    That is a gap of at most two slops. If the pair touches elsewhere, it also is a gap of at most the tolerance times a
+    length: the way that the contact closes in the substep, or ten radii of the smaller body. Else the corners of one
+    face would hit one after another, and each would turn the body that the next one turns back.
     """
     a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
     if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):
@@ -160,12 +177,14 @@ def _is_in_same_moment(k, many):
 
 @inlined
 def set_impact_targets(n, h, is_last, many):
-    """Set the targets of an impact; return the fastest approaching contact of those that cause it, -1 without one.
+    """Set the target velocities of the n contacts in an impact; return the fastest that causes it, -1 if none does.
 
-    See `physics.kernels.contact_law.target_velocity.set_impact_targets`.
+    They follow `contact_law.target_velocity.set_impact_targets`. h is the time left of the substep [s]; `is_last` says
+    that the substep must not be cut again.
 
-    A contact is left to the resting stage, unless it is fast, in two cases: its speed is at most the one that loads
-    give within `rest_share` of the step, or it would close only a few slops until the middle of the step.
+    An approaching contact is left to the resting stage, unless it is faster than `impact_speed_limit`, in two cases.
+    Its speed is at most the one that loads give within `rest_share` of the substep. Or it would close only a few slops
+    until the middle of the stage.
     """
     fastest, is_impact = -1, False
     for k in range(n):
@@ -183,7 +202,10 @@ def set_impact_targets(n, h, is_last, many):
 
 @kernel
 def _extend_impact(n, h, fastest, many):
-    """Add the contacts of the same moment to an impact; return the new fastest approaching contact."""
+    """Give the contacts of the same moment (`_is_in_same_moment`) targets of an impact; return its fastest contact.
+
+    `fastest` is the fastest contact before, n the number of contacts, h the time left of the substep [s].
+    """
     for k in range(n):
         slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
         if many.contacts.gap[k] > slop and _is_in_same_moment(k, many):
@@ -195,7 +217,10 @@ def _extend_impact(n, h, fastest, many):
 
 @inlined
 def drop_unconstrained(n, many):
-    """Drop contacts without a target from the set, since they are not met in this stage; return the rest."""
+    """Remove the unconstrained contacts from the set of n contacts; return how many are left.
+
+    An unconstrained contact has the target -`_UNCONSTRAINED`. It does not close in this stage.
+    """
     left = 0
     for k in range(n):
         if many.contacts.target[k, 0] > -_UNCONSTRAINED:
@@ -214,9 +239,10 @@ def _mark_bodies(k, many):
 
 @inlined
 def constrain_coupled_contacts(n, many):
-    """Keep contacts without a target if their bodies are in other contacts of the set, or in contacts kept for this.
+    """Keep unconstrained contacts in the set, by the target `FORETOLD`, if pushes on their bodies may close them.
 
-    Loads alone do not close these contacts in this stage, but pushes on their bodies may.
+    Loads alone do not close an unconstrained contact in this stage. Pushes may, if one of its bodies is in another
+    contact of the set, or in a contact that was kept for this reason. n is the number of contacts.
     """
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
@@ -237,11 +263,12 @@ def constrain_coupled_contacts(n, many):
 
 @kernel
 def resolve_impacts(n, world, t, h, is_last, switches, records, many):
-    """Velocities after the impulses of approaching contacts, unchanged without one; return the contacts in the set.
+    """Apply the impulses of an impact if contacts cause one: (contacts in the set, time, whether there was one).
 
-    It happens t [s] after the start of the call, with h [s] left of the substep.
-
-    With impacts in turn only the fastest approaching contact gives an impulse: the step comes back for the others.
+    The time [s] is a lower bound of that until the next impact (`time_to_first_impact`). n is the number of contacts in
+    the set at first. The impact happens t [s] after the start of the call, with h [s] left of the substep. `is_last`
+    says that the substep must not be cut again. With sequential impacts only the fastest contact gives an impulse; the
+    substep then looks for further impacts.
     """
     fastest = set_impact_targets(n, h, is_last, many)
     meeting = time_to_first_impact(n, h, is_last, many)
@@ -251,7 +278,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
     if many.settings[0].is_sequential == 1 and not is_last:
         for k in range(n):
             if k != fastest:
-                many.contacts.target[k, 0] = -_UNCONSTRAINED  # its turn comes when this one is over
+                many.contacts.target[k, 0] = -_UNCONSTRAINED  # resolved after this impact, when the step returns
     n = drop_unconstrained(n, many)
     apply_impact_within_energy(n, world, switches.friction, switches.flight.offset_frame, records.report, many)
     if records.log.shape[1] > 0:
@@ -261,10 +288,11 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
 
 @inlined
 def time_to_first_impact(n, h, is_last, many):
-    """Time until the first meeting that matters, at most h [s]; never too late.
+    """Lower bound of the time until the first impact for which a stage must end, at most h [s].
 
-    Two points approach by at most s t + a t²/2, with a bound a of their acceleration by loads and turning. So the gap
-    lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). `conservative_advancement` serves bodies that turn far.
+    Two points approach by at most s t + a t²/2, for their approach speed s and a bound a of their acceleration by loads
+    and rotation. So a gap lasts at least until t = 2 gap/(s + √(s² + 2 a gap)). `conservative_advancement` serves
+    bodies that turn far. In the last stage of a substep (`is_last`) the result is h.
     """
     first = h
     if is_last:

@@ -12,10 +12,11 @@ from physics.kernels.time_stepping import event_log as ev
 
 @kernel
 def log_impacts(n, world, t, many, log, counts):
-    """Log the impulses of the n contacts of an impact, set up at the bodies' places, at the time t [s].
+    """Log the impulses of the n contacts of an impact as events, at t [s] after the start of the call.
 
-    Contacts of one pair follow each other in the set (`dispatch.find_contacts`). The impulse is that on the first body
-    of the pair, whose events these are, and acts at points of it.
+    Contacts of one pair follow each other in the set (`dispatch.find_contacts`) and make one event. Its impulse is the
+    sum of those on the first body of the pair, at points of that body. The event belongs to the first body. `world` is
+    the index of the world; `log` and `counts` are those of `state.groups.Records`.
     """
     first_row, largest = world * many.bodies.state.shape[0], 0.0
     for k in range(n):

@@ -1,4 +1,4 @@
-"""Stage between impacts: exact flight of bodies without contact, Moreau's midpoint step of others."""
+"""Stage between impacts: exact flight of bodies without contact, Moreau's midpoint step of all others."""
 
 from __future__ import annotations
 
@@ -51,7 +51,10 @@ from physics.kernels.time_stepping.midpoint_step import CREEP_SLOP_SHARE
 
 @inlined
 def drift_body(b, h, gyroscopic, offset_frame, many):
-    """Body b after half a free drift: position and attitude at constant momenta."""
+    """Move body b by a drift over h [s]: position and attitude change, momenta stay.
+
+    `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`.
+    """
     x, q, v, L = read_state(many.bodies.state, b)
     write_state(
         many.bodies.state,
@@ -62,10 +65,11 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 
 @inlined
 def _centripetal(b, k, first, side, h, many):
-    """ω x ṙ of one end of contact k, world frame [m/s²].
+    """Acceleration ω x ṙ of body b's point in contact k, world frame [m/s²].
 
-    It is 0 for a sphere, whose contact point does not turn, and where a body turns too far for it to describe the end
-    of a stage of length h.
+    It is 0 for a sphere, whose contact point stays under its centre. It is also 0 if the body turns by more than
+    `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end. `first` is the
+    column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
     shape, w = many.bodies.body[b].shape, row_vector(many.bodies.twist, b, 3)
     if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
@@ -80,10 +84,11 @@ def _centripetal(b, k, first, side, h, many):
 
 @inlined
 def _coriolis(k, many):
-    """Half of the change, by the normal's turning, of the relative velocity along it [m/s²]: n·(ω x u).
+    """Acceleration n·(ω x u) of contact k along its normal, because the normal turns [m/s²].
 
-    A point that slides at u on a face, which turns at ω, meets other normals on its way. So the gap's second derivative
-    has 2 n·(u x ω) beside the accelerations of the points.
+    The point of one body slides with velocity u on a face of the other, the owner of the normal, which turns at ω. The
+    gap's second derivative contains 2 n·(u x ω) beside the accelerations of the points; this is half of it, reversed.
+    It is 0 if the normal has no owner.
     """
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
@@ -93,11 +98,11 @@ def _coriolis(k, many):
 
 @inlined
 def set_resting_targets(n, h, many):
-    """Set the targets of the resting stage over h, with gaps at its middle; see `target_velocity.set_resting_targets`.
+    """Set the target velocities of the n contacts in a resting stage of length h [s], with gaps at its middle.
 
-    A contact with a gap at the start may close the rest of it, measured at the middle, in the second half. Under error
-    control the rise of a point on a circle until then does not count as a gap: it would make the velocity an error of
-    first order.
+    They follow `contact_law.target_velocity.set_resting_targets`. A contact with a gap at the start may close the rest
+    of it, measured at the middle, in the second half of the stage. Under error control, the gap that a point gains only
+    by its motion on a circle is left out: it would cause an error of first order in the velocity.
     """
     half = 0.5 * h
     for k in range(n):
@@ -128,7 +133,10 @@ def set_resting_targets(n, h, many):
 
 @inlined
 def hold_all_loads(h, gyroscopic, offset_frame, many):
-    """Hold the loads of the middle of a stage of length h for every body; nothing where there are no fields."""
+    """Evaluate the loads at the middle of a stage of length h [s], and hold them over the stage, for every body.
+
+    Without force fields it does nothing. `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`.
+    """
     if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
         return
     for b in range(many.bodies.state.shape[0]):
@@ -140,7 +148,11 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
 
 @inlined
 def rest_residual(h, many):
-    """Largest residual of the stage, whatever the tolerance allows; see `midpoint_step.rest_residual`."""
+    """Largest residual that a resting stage of length h [s] may have, whatever the tolerance is [m/s].
+
+    It keeps strongly pressed bodies from creeping; see `time_stepping.midpoint_step.rest_residual`. It is infinite if
+    the tolerance is fine enough for every touching body.
+    """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
         slop_speed = many.bodies.body[b].slop / h
@@ -154,7 +166,7 @@ def rest_residual(h, many):
 
 @inlined
 def max_load_speed(h, many):
-    """Largest speed that the loads of the stage alone give to touching bodies [m/s]."""
+    """Largest speed that loads alone give to a touching body in a stage of length h [s], as a bound [m/s]."""
     most = 0.0
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -164,7 +176,11 @@ def max_load_speed(h, many):
 
 @inlined
 def step_under_held_loads(n, world, h, switches, sleep, records, many):
-    """Take a `midpoint_step` under the held loads."""
+    """Do the work of `midpoint_step` after the loads are held: flights, drifts, contact problem, and its energy check.
+
+    If the impulses raise the energy, the contact problem is solved again with targets that cannot, and then, if need
+    be, without friction. Arguments are those of `midpoint_step`.
+    """
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep):
@@ -219,7 +235,11 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
 
 @kernel
 def midpoint_step(n, world, h, switches, sleep, records, many):
-    """Advance every body by h: exact flight, or Moreau's midpoint step with the n contacts of the set."""
+    """Advance every body by h [s]: exact flight, or Moreau's midpoint step with the n contacts of the set.
+
+    `world` is the index of the world. Loads are held over the stage, and energy that stiff fields create is taken away.
+    Impulses are stored as the next warm start. `sleep` is None if the scene declares no sleep.
+    """
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
     note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.body[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)

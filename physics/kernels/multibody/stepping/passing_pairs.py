@@ -1,14 +1,15 @@
 """Pairs of bodies that pass each other within a stage: their contact acts along a plane that parts them.
 
-A contact of two bodies that are apart keeps its direction through the stage, which is that between their nearest
-points now. To a body that slides past an edge this direction is a wall across its way. Motion decides instead: where
-bodies move freely and turn little, their difference A - B sweeps the convex hull of both its places, at the start and
-at the end. If that hull does not hold the origin, the two never touch, and the direction n in which it is nearest to
-the origin parts them all along: n·(a - b) > 0 for all their points at both ends, and between them. The contact is then
-along n, and gives no impulse unless something else pushes the two together. Bodies that nothing else is near have none.
+A contact of two bodies that are apart keeps its normal through the stage: the direction between their nearest points at
+the start. For a body that slides past an edge, this direction can be a wall across its way. For such pairs the normal
+is taken from the motion instead. If bodies a and b move freely and turn little, their Minkowski difference A - B sweeps
+the convex hull of its places at the start and at the end of the stage. If that hull does not hold the origin, the
+bodies never touch. The direction n in which it is nearest to the origin then parts them: n·(a - b) > 0 for all their
+points at the start, at the end and in between. The contact gets the normal n, and gives no impulse unless something
+else pushes the bodies together. If nothing else is near them, the contact is dropped.
 
-Bodies are taken thinner by the slop each, and by the depth to which they land in others within the stage: an edge that
-stands out by less than that is no obstacle.
+Bodies are taken thinner by the slop, and by the depth to which they land in other bodies within the stage: an edge that
+stands out by less is no obstacle.
 """
 
 from __future__ import annotations
@@ -37,34 +38,34 @@ from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_poin
 from physics.kernels.state.body import read_state
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
 
-# Share of the slop below which the distance between thinned bodies counts as none: what GJK cannot tell from rounding.
+# Distance below which thinned bodies count as touching, as a share of the slop: GJK cannot tell less from rounding.
 _TOUCH_SHARE = 1.0e-2
 
 # Cosine of the angle below which two directions are the same (4e-4 rad).
 _SAME_DIRECTION = 1.0 - 1.0e-7
 
-# Marks of the contacts of a pair, until targets are set: it passes if it is thinned by the slop; it meets, however
-# thin. Others stand between.
+# Marks of the contacts of a pair until targets are set: the pair passes even if it is thinned by the slop alone; it
+# meets however thin it is. The mark 0 is for pairs in between.
 _PASSING = 1.0
 _MEETING = -1.0
 
-# Slops up to which the depth that bodies go in counts as a landing: twice the `_SOFT_LANDING_SLOPS` of `impact`, which
-# the resting stage stops at its middle. Deeper is an impact, or an overlap that a user made.
+# Largest landing depth, in slops: twice the `_SOFT_LANDING_SLOPS` of `impact`, since the resting stage stops a landing
+# at its middle. A deeper contact is an impact, or an overlap that a user made.
 _MAX_DEPTH_SLOPS = 200.0
 
-# Share of the smallest half-width by which bodies are taken thinner at most.
+# Largest depth by which bodies are taken thinner, as a share of their smallest half-width.
 _MAX_THINNING_SHARE = 0.5
 
 
 @inlined
 def _depth_after(k, h, many):
-    """Depth of contact k after h at its present speed [m]."""
+    """Depth of contact k after h [s] at its present speed [m]; negative if the contact is still open."""
     return -many.contacts.gap[k] - h * many.contacts.speed[k]
 
 
 @inlined
 def _smallest_half_width(b, many):
-    """Smallest half-width of body b [m]; of a hull that of the block with its `dimensions`."""
+    """Smallest half-width of body b [m]; for a hull that of its bounding block."""
     d = many.bodies.body[b].dims
     if many.bodies.body[b].shape == SPHERE:
         return d[0]
@@ -73,9 +74,10 @@ def _smallest_half_width(b, many):
 
 @kernel
 def _thinning(a, b, n, h, many):
-    """By how much bodies a and b are taken thinner [m]: the slop, and how deep they land in others within h.
+    """Depth by which bodies a and b are taken thinner [m]: the slop, plus their landing depth within h [s].
 
-    They do not land in bodies that they are marked to pass.
+    The landing depth is the largest depth to which a or b goes into other bodies or walls, among the n contacts. Pairs
+    that are marked as passing do not count, nor do depths beyond `_MAX_DEPTH_SLOPS`.
     """
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
@@ -91,7 +93,10 @@ def _thinning(a, b, n, h, many):
 
 @inlined
 def _moves_as_foreseen(a, b, gap, n, h, many):
-    """True if nothing else is near bodies a and b, and their loads do not close their gap within h."""
+    """True if nothing else is near bodies a and b, and their loads cannot close the gap [m] within h [s].
+
+    "Near" means a contact with another body or a wall, among the n of the set.
+    """
     for k in range(n):
         c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
         if (c != a or d != b) and (c in (a, b) or d in (a, b)):
@@ -103,14 +108,14 @@ def _moves_as_foreseen(a, b, gap, n, h, many):
 
 @inlined
 def _is_stopping(k, h, many):
-    """True if contact k of two bodies would stop them within h."""
+    """True if contact k of two bodies would stop them within h [s]; see `contact_set.is_stopping`."""
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     return is_stopping(many.contacts.gap[k], many.contacts.speed[k], slop, h)
 
 
 @inlined
 def _end_pose(b, h, gyroscopic, offset_frame, many):
-    """(geometric centre, rotation) of body b after h of free motion at constant momenta."""
+    """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
     x, q, v, L = read_state(many.bodies.state, b)
     R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
     x = add_scaled(x, h, v)
@@ -121,7 +126,7 @@ def _end_pose(b, h, gyroscopic, offset_frame, many):
 
 @kernel
 def _hull_holds_point(b, p, thinner, many):
-    """True if point p, in the frame of hull b, lies below each of its faces by `thinner` [m]."""
+    """True if point p, in the frame of hull b, lies below each face of the hull by more than `thinner` [m]."""
     tables = many.narrowphase.hulls
     first = tables.of[b, FIRST_CORNER]
     for f in range(tables.of[b, FIRST_FACE], tables.of[b, LAST_FACE]):
@@ -133,7 +138,10 @@ def _hull_holds_point(b, p, thinner, many):
 
 @inlined
 def _holds_point(b, p, thinner, hulls, many):
-    """True if body b, thinned, holds point p in its frame."""
+    """True if body b, shrunk by `thinner` [m] on all sides, holds point p.
+
+    p leads from the body's geometric centre, in the body frame [m]. `hulls` is None if the scene has no hulls.
+    """
     d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
@@ -149,7 +157,12 @@ def _holds_point(b, p, thinner, hulls, many):
 
 @inlined
 def _have_point_in_common(k, now, later, thinner, hulls, many):
-    """True if both bodies of contact k, thinned, hold the middle of where they carry its point; False says nothing."""
+    """True if the two bodies of contact k, shrunk by `thinner` [m], certainly overlap in the later poses.
+
+    Each body carries its contact point along. The test asks whether both bodies hold the middle between these two
+    points. If it fails, the bodies may still overlap. `now` and `later` are pairs of poses (geometric centre, rotation
+    matrix).
+    """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     (c, R), (d, S) = now
     (x, P), (y, Q) = later
@@ -164,7 +177,10 @@ def _have_point_in_common(k, now, later, thinner, hulls, many):
 
 @kernel
 def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
-    """Direction out of b that parts the bodies a and b of contact k throughout h, and whether there is one."""
+    """Find a direction that parts the bodies of contact k throughout h [s]: (unit vector out of the second, found).
+
+    The bodies are shrunk by `thinner` [m] on all sides.
+    """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     now = (
         (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
@@ -180,7 +196,10 @@ def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def _gap_along(a, b, n, hulls, many):
-    """Gap between two bodies along n, and their nearest points along it [m]."""
+    """Gap of bodies a and b along the unit vector n out of b: (gap [m], nearest point of a, nearest point of b).
+
+    The points are in the world frame [m].
+    """
     x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
     p = support_point(a, x, row_matrix(many.bodies.rotation, a), (-n[0], -n[1], -n[2]), 0.0, hulls, many)
     q = support_point(b, y, row_matrix(many.bodies.rotation, b), n, 0.0, hulls, many)
@@ -189,7 +208,7 @@ def _gap_along(a, b, n, hulls, many):
 
 @inlined
 def _end_of_pair(k, n, many):
-    """First contact after k, of the n in the set, of another pair."""
+    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
         k += 1
@@ -198,7 +217,10 @@ def _end_of_pair(k, n, many):
 
 @inlined
 def _fastest_stopping(first, last, h, many):
-    """Fastest contact of a pair that would stop it; -1 without one, or if `conservative_advancement` serves it."""
+    """Fastest contact in [first, last), all of one pair, among those that would stop the pair within h [s]; -1: none.
+
+    A contact with a wall does not count, nor a pair that `conservative_advancement` serves since a body turns far.
+    """
     a, b, found = many.contacts.bodies[first, 0], many.contacts.bodies[first, 1], -1
     if b < 0 or many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0:
         return found
@@ -210,9 +232,11 @@ def _fastest_stopping(first, last, h, many):
 
 @kernel
 def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
-    """Mark of the pair whose fastest contact is k, of n in the set: `_PASSING`, `_MEETING` or 0.
+    """Mark of the pair whose fastest contact is k: `_PASSING`, `_MEETING`, or 0 for neither.
 
-    A pair that meets even where it is as thin as it may get needs no second look.
+    A pair is meeting if no plane parts its bodies even when they are thinned by `_thinning`. It is passing if a plane
+    parts them when they are thinned by the slop alone, and the plane is not across the normal of contact k. n is the
+    number of contacts in the set, h the length of the stage [s].
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     slop, thinnest = pair_slop(a, b, many), _thinning(a, b, n, h, many)
@@ -226,7 +250,11 @@ def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
 
 @inlined
 def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
-    """Write the mark of each pair into `many.contacts.target` of its contacts; targets are set later."""
+    """Write the mark of each pair, as found by `_mark_of_pair`, for each of its contacts.
+
+    Marks are stored in `many.contacts.target`, since targets are set later in the stage. n is the number of contacts in
+    the set, h the length of the stage [s].
+    """
     for k in range(n):
         many.contacts.target[k, 0] = 0.0
     k = 0
@@ -242,11 +270,11 @@ def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
 
 @kernel
 def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
-    """Replace the contacts of a passing pair by one, at `to`; k is its fastest contact, of n in the set.
+    """Replace the contacts of a passing pair by one contact in row `to` of the set: (whether it passes, next row).
 
-    Returns whether the pair passes, and the new number of contacts. A contact that lands along its own direction stays.
-    So does a contact of bodies that touch along the plane between them, unless it is deeper than their thinning along
-    any direction. Bodies that nothing else can push have no contact.
+    k is the pair's fastest contact, of n in the set. The old contacts stay in two cases. The direction that parts the
+    bodies may be the normal of contact k already. Or the bodies touch along that direction, unless contact k is deeper
+    than their thinning allows along any direction. Passing bodies that nothing else can push get no contact.
     """
     a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
     mark, thinner = many.contacts.target[k, 0], _thinning(a, b, n, h, many)
@@ -267,7 +295,11 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
 
 @shared_kernel
 def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
-    """Replace the contacts of each pair that passes within h by one along a plane that parts the two."""
+    """Replace the contacts of each pair that passes within h [s] by one along a plane that parts the two bodies.
+
+    n is the number of contacts in the set; the new number is written to `many.counts[NUM_CONTACTS]`. `gyroscopic` and
+    `offset_frame` are switches of `state.groups.FlightSwitches`; `hulls` is None if the scene has none.
+    """
     _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:

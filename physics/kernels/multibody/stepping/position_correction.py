@@ -1,8 +1,8 @@
-"""Push overlapping bodies apart: positions only; velocities change if energy would grow (`energy_budget`).
+"""Position correction: push overlapping bodies apart, without giving them a velocity.
 
-The displacements of the bodies solve the frictionless contact problem whose targets are depths instead of velocities:
-the least displacement, in the metric of mass, that brings every contact of the set back to half a slop. A quarter of
-overlap therefore comes apart without speed.
+The displacements of the bodies solve a frictionless contact problem with depths as targets instead of velocities. The
+solution is the least displacement, in the kinetic metric, that takes back half of each overlap beyond half a slop.
+Momenta change only to keep the angular momentum, and to keep the energy from growing (`energy_budget`).
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from physics.kernels.multibody.stepping.position_sweeps import sweep_positions
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 
-# Share of the depth beyond half a slop that one stage takes back: turning makes the whole of it overshoot.
+# Share of the depth beyond half a slop that one correction takes back. Since bodies turn, the whole depth would
+# overshoot.
 _CORRECTION_SHARE = 0.5
 
-# Rounds, and the depth in slops from which on there is another, if the last one helped: what loads of a million times
-# the weight have turned deep into others is taken out at once.
+# Largest number of corrections in a stage, and the depth in slops above which another one follows, if the last one
+# helped. Loads of a million times the weight may turn bodies deep into others, and these are moved out at once.
 _MAX_ROUNDS = 30
 _DEEP_SLOPS = 100.0
 
-# Share of their energy of turning that bodies without relative motion gain for nothing where momentum is kept.
+# Largest gain of two bodies without relative motion that is not taken from them, as a share of their rotational energy.
 _FREE_SPIN_SHARE = 1.0e-6
 
-# Error of the displacements at most, relative to the largest target, or to so many slops where that is less,
-# and sweeps for it at most, if a contact problem may take as many: something light between a wall and something heavy
-# needs as many as their masses differ. A stage leaves half of the depth anyway, and half a slop less than the slop:
-# what is off by less is done with. Where solves are finer than that the error is the root of their tolerance, since
-# what it leaves grows with every landing.
+# Largest error of the displacements, relative to the largest target or to so many slops, whichever is larger; if solves
+# have a fine tolerance, the square root of the tolerance in its place, since errors add up over landings. Then the
+# largest number of sweeps, and that for deep penetrations: a light body between a wall and a heavy body needs as many
+# sweeps as the ratio of the masses. A stage leaves half of the depth anyway, so that a coarse error does no harm.
 _CORRECTION_ERROR = 1.0e-2
 _ERROR_SLOPS = 10.0
 _CORRECTION_SWEEPS = 50
@@ -52,9 +52,10 @@ _DEEP_SWEEPS = 1000
 
 @inlined
 def _set_displacement_targets(n, many):
-    """Set the target displacements along the normals: (deepest penetration, negligible error of a displacement [m]).
+    """Set the target displacements of the n contacts along their normals: (deepest penetration, allowed error [m]).
 
-    The penetration is in slops of its pair; displacements begin at 1.
+    The penetration is in slops of its pair; contacts deeper than 1 slop have a target above 0. The allowed error is
+    that of a displacement.
     """
     deepest, largest, least = 0.0, 0.0, math.inf
     for k in range(n):
@@ -70,14 +71,14 @@ def _set_displacement_targets(n, many):
 
 @inlined
 def _pose_inside_walls(b, offset_frame, many):
-    """Place of body b with its centre inside all walls."""
+    """Update the pose of body b, and move its geometric centre inside all walls."""
     update_body_pose(b, offset_frame, many)
     clamp_body_inside_walls(b, many)
 
 
 @kernel
 def _mark_held_islands(n, many):
-    """Mark the islands that a wall pushes: `many.islands.of_body` is 1 at their root, else 0."""
+    """Mark the islands of the n contacts that a wall pushes: `many.islands.of_body` is 1 at their root, else 0."""
     union_contacts(n, many)
     for b in range(many.bodies.state.shape[0]):
         many.islands.of_body[b] = 0
@@ -88,34 +89,38 @@ def _mark_held_islands(n, many):
 
 @inlined
 def _is_held(b, many):
-    """True if a wall pushes the island of body b."""
+    """True if a wall pushes the island of body b (`_mark_held_islands`)."""
     return many.islands.of_body[find_root(b, many.islands.parent)] == 1
 
 
 @inlined
 def _add_angular_momentum(b, s, turn, many):
-    """Add s `turn` to the angular momentum of body b."""
+    """Add s times the vector `turn` to the angular momentum of body b."""
     put_vector(many.bodies.state, b, at.ANGMOM, add_scaled(row_vector(many.bodies.state, b, at.ANGMOM), s, turn))
 
 
 @inlined
 def _spin(b, many):
-    """Angular velocity of body b, world frame [rad/s]."""
+    """Angular velocity of body b from its angular momentum, world frame [rad/s]."""
     return apply_body_inv_inertia(b, row_vector(many.bodies.state, b, at.ANGMOM), many)
 
 
 @inlined
 def _share_that_takes(energy, stock):
-    """Share s of a relative velocity with the energy `stock` to take for an `energy`: stock (1 - (1 - s)²)."""
+    """Share s of a relative velocity to remove, so that its energy `stock` decreases by `energy` [J].
+
+    It solves energy = stock (1 - (1 - s)²).
+    """
     return 1.0 - math.sqrt(max(0.0, 1.0 - energy / stock)) if stock > 0.0 else 0.0
 
 
 @kernel
 def _take_relative_energy(a, b, energy, many):
-    """Take energy [J] from the relative motion of two bodies, with both momenta kept; return whether it sufficed.
+    """Take `energy` [J] from the relative motion of bodies a and b, with both total momenta kept.
 
-    The energy comes first from the velocity along the line of centres, then from the difference of their spins, with
-    the least of their moments of inertia. Nothing is taken if both have less.
+    It is taken first from the relative velocity along the line of centres. The rest is taken from the difference of the
+    angular velocities, with a lower bound of their reduced moment of inertia. Returns False, and takes nothing, if both
+    together have less.
     """
     inverse = many.bodies.inv_mass[a] + many.bodies.inv_mass[b]
     way = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
@@ -139,10 +144,11 @@ def _take_relative_energy(a, b, energy, many):
 
 @kernel
 def _keep_angular_momentum(n, many):
-    """Turn the bodies of each contact, to keep the angular momentum that pushing their centres apart would add.
+    """Turn the bodies of each of the n contacts, to keep the angular momentum that their displacement would add.
 
-    To move a by p n/m_a and b by -p n/m_b adds p n x (v_a - v_b). Both bodies take up a part by their m r²: they get
-    the same angular velocity, as if they were one. `many.contacts.rebound_impulse` stores the added energy.
+    A displacement of a by p n/m_a and of b by -p n/m_b adds p n x (v_a - v_b). Both bodies take up a part of it, in
+    proportion to their m r² (mass, bounding radius). The energy that this adds is stored in
+    `many.contacts.rebound_impulse` [J].
     """
     for k in range(n):
         a, b, p = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.impulse[k, 0]
@@ -171,8 +177,8 @@ def _spin_energy(b, many):
 def _pay_for_spins(n, offset_frame, many):
     """Take the energy that `_keep_angular_momentum` has added from the relative motion of the bodies.
 
-    An energy beyond that of the relative motion, and beyond a negligible one, is taken from the bodies' spins, which
-    changes their momentum.
+    If the relative motion has too little, and the energy is not negligible, it is taken from the motion of both bodies,
+    which changes their momentum.
     """
     for k in range(n):
         a, b, gain = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.rebound_impulse[k, 0]
@@ -186,7 +192,10 @@ def _pay_for_spins(n, offset_frame, many):
 
 @inlined
 def _displace(b, offset_frame, many):
-    """Move and turn body b by `many.bodies.twist`; return the work against its loads [J]."""
+    """Move and turn body b by the displacement in `many.bodies.twist`; return the work against its loads [J].
+
+    The work is 0 if no wall pushes the island of b.
+    """
     x, q, v, L = read_state(many.bodies.state, b)
     start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
@@ -200,7 +209,7 @@ def _displace(b, offset_frame, many):
 
 @inlined
 def _displace_all(offset_frame, many):
-    """Move and turn the bodies, and let the lifted ones pay for the lift of all (`energy_budget`)."""
+    """Move and turn all pushed bodies, and take the work of lifting them from the motion of the lifted ones."""
     total = ups = free = 0.0
     for b in range(many.bodies.state.shape[0]):
         many.bodies.lift_work[b] = 0.0
@@ -220,7 +229,10 @@ def _displace_all(offset_frame, many):
 
 @inlined
 def _correct_once(n, offset_frame, many):
-    """Do one round for the n contacts, set up at the bodies' places; return the greatest depth, in slops."""
+    """Correct the positions of the bodies of the n contacts once; return the deepest penetration before, in slops.
+
+    Arms and gaps are first updated to the bodies' present places.
+    """
     update_contacts(many)
     deepest, error = _set_displacement_targets(n, many)
     if not deepest > 1.0:
@@ -237,7 +249,11 @@ def _correct_once(n, offset_frame, many):
 
 @shared_kernel
 def correct_positions(n, offset_frame, many):
-    """Move the bodies of the n contacts apart where they overlap by more than the slop."""
+    """Move the bodies of the n contacts apart where they overlap by more than the slop.
+
+    A correction repeats while the deepest penetration is above `_DEEP_SLOPS` and decreases. `offset_frame` is a switch
+    of `state.groups.FlightSwitches`.
+    """
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
             _pose_inside_walls(b, offset_frame, many)

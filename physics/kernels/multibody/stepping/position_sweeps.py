@@ -1,8 +1,7 @@
-"""Displacements that push bodies apart: sweeps along the normals over contacts that overlap.
+"""Displacements that push bodies apart: sweeps along the contact normals over contacts that overlap.
 
-Most contacts of a set never move: they begin as they are asked to be, and no body of theirs is pushed. So a contact is
-assembled where it is visited first, and once no sweep comes to a new body only the contacts of bodies that were pushed
-are gone through.
+Most contacts of a set have no target displacement above 0, and their bodies are never pushed. So the row of a contact
+is assembled at its first visit. After a sweep that pushes no new body, only contacts of pushed bodies are visited.
 """
 
 from __future__ import annotations
@@ -14,17 +13,17 @@ from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.gauss_seidel import is_contact_up_to_date, relax_normal_impulse
 from physics.kernels.multibody.solver.normal_rows import assemble_normal_row, body_twist_from_motion, put_padded
 
-# Share of the error allowed within which a contact is left as it is: each that is answered leaves those of two bodies
-# to be visited again.
+# Share of the goal within which a contact is left as it is: every correction makes the contacts of two bodies due for
+# another visit.
 _SKIP_SHARE = 0.5
 
-# W_nn of a contact that is not assembled yet: that of any other is positive.
+# W_nn of a contact whose row is not assembled yet; that of any other contact is positive.
 _NOT_ASSEMBLED = 0.0
 
 
 @inlined
 def _clear_displacements(n, many):
-    """Clear displacements, and flag only contacts with a target above 0 for a visit."""
+    """Clear the displacements, and flag the contacts with a target above 0 (of the n in the set) for a visit."""
     for b in range(many.bodies.state.shape[0]):
         many.sweeps.pushed[b] = 0
         put_padded(many.sweeps.motion, b, 0, (0.0, 0.0, 0.0))
@@ -38,9 +37,10 @@ def _clear_displacements(n, many):
 
 @inlined
 def _sweep(count, is_up, visits, goal, many):
-    """Sweep once over `many.islands.contacts[:count]`: (largest error of an impulse, visits so far, whether it spread).
+    """Sweep once over `many.islands.contacts[:count]`: (largest error [m], visits so far, whether it has spread).
 
-    It has spread if it pushed a body that had not been pushed before.
+    The sweep goes up the list if `is_up`, else down. It has spread if it pushed a body that had not been pushed before.
+    `goal` [m] is the error below which a contact is done; `visits` is the number of earlier visits.
     """
     worst, has_spread = 0.0, False
     for i in range(count):
@@ -67,7 +67,7 @@ def _list_all(n, many):
 
 @inlined
 def _list_pushed(n, many):
-    """List the contacts of bodies that were pushed; return their number."""
+    """List the contacts of pushed bodies, of the n in the set, in `many.islands.contacts`; return their number."""
     count = 0
     for k in range(n):
         b = many.contacts.bodies[k, 1]
@@ -79,9 +79,10 @@ def _list_pushed(n, many):
 
 @kernel
 def sweep_positions(n, goal, limit, many):
-    """Displacements `many.bodies.twist` that bring the n contacts to their targets within `goal` [m]; counts sweeps.
+    """Find displacements that bring the n contacts to their targets within `goal` [m]; return the number of sweeps.
 
-    `many.sweeps.pushed` is 0 for bodies that stay where they are.
+    The displacements (translation and rotation) are written to `many.bodies.twist`. `many.sweeps.pushed` is 0 for
+    bodies that stay where they are. There are at most `limit` sweeps.
     """
     _clear_displacements(n, many)
     sweeps, visits, count, worst = 0, 0, n, math.inf

@@ -1,4 +1,4 @@
-"""Impacts among bodies that would gain energy by friction and restitution; see `contact_law.restitution_energy`."""
+"""Impacts among bodies with the largest rebound that creates no energy; see `contact_law.restitution_energy`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, 
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 
+# First columns of the momenta before an impact, and after its full rebound, in `many.bodies.momenta`.
 _PRE_IMPACT, _FULL_REBOUND = 0, 6
 
-# Tolerances of its solve by which a plastic impact may raise the energy, as a share of it.
+# Largest relative gain of energy in a plastic impact, in tolerances of its solve.
 _ENERGY_TOLERANCES = 4.0
 
 
 @inlined
 def _save_momenta(first, many):
-    """Copy the momenta of all bodies to `many.bodies.momenta`."""
+    """Copy velocities and angular momenta of all bodies to `many.bodies.momenta`, from column `first` on."""
     for b in range(many.bodies.state.shape[0]):
         put_vector(many.bodies.momenta, b, first, row_vector(many.bodies.state, b, at.LINVEL))
         put_vector(many.bodies.momenta, b, first + 3, row_vector(many.bodies.state, b, at.ANGMOM))
@@ -27,7 +28,7 @@ def _save_momenta(first, many):
 
 @inlined
 def _update_twists(offset_frame, many):
-    """Twists of all bodies from their momenta."""
+    """Compute the twists of all bodies from their momenta."""
     for b in range(many.bodies.state.shape[0]):
         _, q, v, L = read_state(many.bodies.state, b)
         put_vector(many.bodies.twist, b, 0, v)
@@ -47,7 +48,7 @@ def world_kinetic_energy(offset_frame, many):
 
 @inlined
 def _blend_momenta(s, many):
-    """Move the momenta of all bodies by the share s towards those of the full rebound."""
+    """Move the momenta of all bodies by the share s towards those after the full rebound (column `_FULL_REBOUND`)."""
     for b in range(many.bodies.state.shape[0]):
         v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
         v_full, L_full = (
@@ -80,14 +81,14 @@ def _blend_impulses(n, s, many):
 
 @inlined
 def _is_to_rebound(k, many):
-    """True if the target of contact k is a rebound by Newton's law, other than 0."""
+    """True if the target of contact k is a rebound by Newton's law, and not 0."""
     goal = many.contacts.target[k, 0]
     return goal != 0.0 and goal == -many.contacts.restitution[k] * many.contacts.speed[k]
 
 
 @inlined
 def _set_plastic_targets(n, many):
-    """Set targets without rebound for touching contacts, and momenta to those before the impact."""
+    """Set up the n contacts as a plastic impact: rebound targets become 0, and momenta those before the impact."""
     for k in range(n):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
         if _is_to_rebound(k, many):
@@ -99,7 +100,7 @@ def _set_plastic_targets(n, many):
 
 @inlined
 def _has_rebound(n, many):
-    """True if any contact has a rebound."""
+    """True if any of the n contacts has a rebound as its target."""
     for k in range(n):
         if _is_to_rebound(k, many):
             return True
@@ -108,7 +109,10 @@ def _has_rebound(n, many):
 
 @kernel
 def _apply_frictionless(n, offset_frame, many):
-    """Apply a plastic impact without friction from the momenta before, after all solves with friction have failed."""
+    """Solve and apply a plastic impact of the n contacts without friction, from the momenta before the impact.
+
+    This is the last resort, if all solves with friction would create energy.
+    """
     _set_plastic_targets(n, many)
     _update_twists(offset_frame, many)
     solve_frictionless_and_apply(n, many)
@@ -116,9 +120,10 @@ def _apply_frictionless(n, offset_frame, many):
 
 @kernel
 def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
-    """Solve and apply the n contacts of an impact, with the largest rebound that creates no energy.
+    """Solve and apply an impact of the n contacts, with the largest rebound that creates no energy.
 
-    With friction the law itself may require more energy than there is; without friction a loose solve may create some.
+    With friction, Newton's law may require more energy than the bodies have. Without friction, a loose solve may create
+    some. `world` is the index of the world; `friction` is None if the scene has no friction.
     """
     _save_momenta(_PRE_IMPACT, many)
     before = world_kinetic_energy(offset_frame, many)
@@ -142,6 +147,6 @@ def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
     _blend_momenta(0.5, many)
     middle = world_kinetic_energy(offset_frame, many)
     s = rebound_share(before, plastic, full, middle)
-    _blend_momenta(2.0 * s - 1.0, many)  # from the middle
+    _blend_momenta(2.0 * s - 1.0, many)  # momenta are at the middle between plastic impact and full rebound
     _blend_impulses(n, s, many)
     _update_twists(offset_frame, many)

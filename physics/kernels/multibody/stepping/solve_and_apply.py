@@ -1,4 +1,4 @@
-"""Solve a contact problem, and change momenta by its impulses."""
+"""Solve a contact problem, and change the bodies' momenta by its impulses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from physics.kernels.state.body import report_solve
 
 @inlined
 def apply_impulses(n, many):
-    """Apply the contact impulses to the momenta of the bodies; v from the solve, L + Σ r x p."""
+    """Apply the impulses of the n contacts to the bodies' states: velocities and angular momenta.
+
+    Velocities are copied from the solved twists; angular momenta L become L + Σ r x p.
+    """
     for k in range(n):
         p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
@@ -42,9 +45,11 @@ def apply_impulses(n, many):
 
 @kernel
 def _balance_moments(k, a, b, p, many):
-    """Take the moment of the impulse p at one point of contact k, and of -p at the other, from both spins.
+    """Correct the angular momenta of bodies a and b for a contact k whose points on them differ.
 
-    Each takes a part by its m r². Points of other contacts are one and the same.
+    The impulse p at one point and -p at the other have a moment together, which would change the total angular
+    momentum. Both bodies take up a part of it, in proportion to their m r² (mass, bounding radius). At contacts that
+    are not `PARTED` both points coincide.
     """
     x = add_scaled(row_vector(many.bodies.state, a, at.POS), 1.0, row_vector(many.contacts.arm, k, 0))
     y = add_scaled(row_vector(many.bodies.state, b, at.POS), 1.0, row_vector(many.contacts.arm, k, 3))
@@ -58,7 +63,10 @@ def _balance_moments(k, a, b, p, many):
 
 @kernel
 def solve_and_apply(n, world, friction, report, many):
-    """Solve the contact problem of the stage, apply its impulses to the bodies, and add it to the report."""
+    """Solve the contact problem of the n contacts, apply its impulses to the bodies, and add it to the report.
+
+    `world` is the index of the world; `friction` is None if the scene has no friction.
+    """
     iterations, residual, method = solve_contacts(n, friction, many)
     apply_impulses(n, many)
     report_solve(report, world, residual, iterations, method, many.settings[0].tolerance)
@@ -66,6 +74,9 @@ def solve_and_apply(n, world, friction, report, many):
 
 @kernel
 def solve_frictionless_and_apply(n, many):
-    """Do `solve_and_apply` without friction, after a failed solve with it that the report already counts."""
+    """Solve the n contacts without friction and apply the impulses, after a solve with friction has failed.
+
+    The report counts the failed solve already.
+    """
     solve_all_frictionless(n, many)
     apply_impulses(n, many)

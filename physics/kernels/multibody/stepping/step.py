@@ -1,10 +1,8 @@
-"""Step of worlds whose bodies touch each other: substeps, each a visible list of stages (`substep`).
+"""Step of worlds whose bodies touch each other: substeps, each of them a list of stages (`substep`).
 
-Where the plan asks for an error instead of a number of substeps, each of them is cut into parts that meet it
-(`adaptive_substep`).
-
-Where the scene declares it, what has been at rest for long enough then falls asleep and takes part in none of this, but
-for the broad phase, until something wakes it (`sleep`).
+If the plan gives an error tolerance instead of a number of substeps, each substep is cut into parts that meet the
+tolerance (`adaptive_substep`). If the scene declares sleep, groups of bodies that have been at rest for long enough
+fall asleep (`data.sleeping`). Sleeping bodies only take part in the broad phase, until something wakes them.
 """
 
 from __future__ import annotations
@@ -34,10 +32,30 @@ from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 @inlined
 def advance_world(world, grid, arrays, switches, restitution, kept, sleep, records, many):
-    """Advance a world by `grid.steps` steps.
+    """Advance a world by `grid.steps` steps, and write its new state, report and events.
 
-    A world in which a new state is not finite keeps the last good one, and its report counts the fault.
-    Impacts go to `records.log`, if that has any room, their number to `records.counts`.
+    Parameters
+    ----------
+    world : int
+        Index of the world.
+    grid : TimeGrid
+        Numbers of steps and substeps, length of a substep.
+    arrays : BodyArrays
+        States, parameters and loads of all worlds.
+    switches : MultibodySwitches
+        Effects that are compiled in.
+    restitution : None or not None
+        None if the scene declares no restitution.
+    kept : WorldSnapshots or None
+        Room for snapshots; None without error control.
+    sleep : Sleep or None
+        None if the scene declares no sleep.
+    records : Records
+        Warm starts, reports, and logs of impacts. `records.counts` counts impacts even if the log has no room.
+    many : BodiesWorkspace
+        Scratch memory.
+
+    If a new state is not finite, the world keeps the last good one, and its report counts a fault.
     """
     state, params, shapes, wrench = arrays.state, arrays.params, arrays.shapes, arrays.wrench
     memory, report, log, counts = records.memory, records.report, records.log, records.counts
@@ -92,5 +110,5 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_many(queue, grid, arrays, switches, restitution, kept, sleep, records, many):
-    """Advance the worlds that no other thread has taken, with bodies that touch each other: `advance_world`."""
+    """Advance, by `advance_world`, each world that no other thread has taken from the work queue."""
     _advance_worlds(queue, (grid, arrays, switches, restitution, kept, sleep, records, many))

@@ -5,18 +5,19 @@ their states, M their masses and inertias, f the loads, J the Jacobian of the co
 impulses.
 
 1. Hold loads         f = f(y), held over the stage                                        `hold_all_loads`
-2. Find contacts      {i : g_i <= what the time left can close}: sweep and prune, then the `find_contacts`
+2. Find contacts      {i : g_i can close in the time left}: sweep and prune, then the      `find_contacts`
                       narrow phase of each pair
-3. Part passing pairs n such that n·(a - b) > 0 all through the stage, where there is one  `redirect_passing_pairs`
+3. Part passing pairs a normal n with n·(a - b) > 0 all through the stage, if one exists   `redirect_passing_pairs`
 4. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n;        `resolve_impacts`
                       later meetings are speculative: u_n⁺ >= -g/t
-5. Limit the stage    the first t at which bodies meet that bounce, are fast, or turn far  `safe_stage_length`
+5. Limit the stage    to the first t at which bodies meet that bounce, are fast or turn    `safe_stage_length`
+                      far
 6. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `midpoint_step`
                       in contact Moreau's midpoint step: x, q drift by h/2;
                       M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
                       x, q drift by h/2
 7. Correct positions  overlaps are pushed apart, positions only                            `correct_positions`
-8. Sleep              groups whose motion stays below a threshold are left out (`step`)    `update_sleep`
+8. Sleep              groups whose motion stays below a threshold fall asleep (in `step`)  `update_sleep`
 
 No body passes through another one, however fast: a speculative contact bounds the speed at which the gap may close.
 """
@@ -41,19 +42,20 @@ from physics.kernels.multibody.stepping.position_correction import correct_posit
 from physics.kernels.state import layout as at
 from physics.kernels.state.groups import flies_exactly
 
-# Cuts of a substep per impact allowed: a meeting is approached from before it, in two or three.
+# Largest number of cuts of a substep, per impact that it may have. The time to an impact is a lower bound, so that two
+# or three cuts lead up to one.
 SPLITS_PER_IMPACT = 4
 
-# Bodies put into each other deeper than this share of the smaller one's bounding radius overlap: as for walls
-# (`physics.world.setters.START_DEPTH`), which refuse it.
+# Depth from which bodies that a user placed count as overlapping, as a share of the smaller one's bounding radius. The
+# same depth in a wall is refused (`physics.world.setters.START_DEPTH`).
 OVERLAP_SHARE = 1.0e-2
 
 
 @inlined
 def record_penetration(n, world, memory, report, many):
-    """Record the set's deepest penetration in the world's report, and the number of contacts without room.
+    """Record the deepest penetration of the n contacts, and the contacts that found no room, in the world's report.
 
-    After bodies were placed by a user the memory is empty, even of a stage's length; their overlap is reported.
+    If `memory` is empty, a user has just placed the bodies: then overlap of two bodies is reported, too.
     """
     is_start = memory[world, WARM_STAGE_LENGTH] == 0.0
     for k in range(n):
@@ -72,7 +74,7 @@ def record_penetration(n, world, memory, report, many):
 
 @inlined
 def mark_touched(n, many):
-    """Mark bodies in a contact of the set in `many.bodies.touched`."""
+    """Set `many.bodies.touched` to 1 for bodies in one of the n contacts, to 0 for all others."""
     for b in range(many.bodies.touched.shape[0]):
         many.bodies.touched[b] = 0
     for k in range(n):
@@ -84,7 +86,11 @@ def mark_touched(n, many):
 @kernel
 def substep_world(
     world, start, h, switches, sleep, records, many):  # fmt: skip
-    """Advance the bodies of one world by h, `start` after the call [s]: the stages of the module's list."""
+    """Advance the bodies of one world by a substep of h [s]: the stages of the module's list, repeated until h is over.
+
+    `start` is the time since the start of the call [s], `world` the index of the world. For the other arguments see
+    `step.advance_world`.
+    """
     left, impacts, cuts, turns = h, 0, 0, 0
     many.settings[0].substep = h
     while True:
@@ -108,7 +114,7 @@ def substep_world(
         if is_impact and not is_last:
             impacts += 1
             cuts += 1
-            continue  # what may be met in the time left is another set now
+            continue  # velocities have changed, so that other contacts may close in the time left
         mark_touched(n, many)
         if is_last:
             records.report[world, at.UNRESOLVED] += 1.0
