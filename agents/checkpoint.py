@@ -111,7 +111,13 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
 
 
 def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
-    """The trained policy of a run, acting without exploration.
+    """The trained policy of a run, acting without exploration; see `load_trained`."""
+    config, model = load_trained(run)
+    return config, greedy(model)
+
+
+def load_trained(run: RunFolder) -> tuple[RunConfig, BaseAlgorithm]:
+    """The trained model of a run, for acting.
 
     It is that of `model.zip`, or of the newest checkpoint if training has not ended. Code in the file runs while it is
     read; a line on standard error says so.
@@ -129,4 +135,4 @@ def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
     tell_code_runs(found[-1])
-    return config, greedy(CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY))
+    return config, CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rigid_env.envs.block_reach import BlockReachEnv, BlockReachVectorEnv
     from rigid_env.envs.block_reorient import BlockReorientEnv, BlockReorientVectorEnv
     from rigid_env.envs.checks import check_task
+    from rigid_env.envs.policy_files import load_policy
     from rigid_env.envs.sb3 import RigidVecEnv as RigidVecEnv
     from rigid_env.envs.scene import SceneEnv, SceneVectorEnv
     from rigid_env.envs.task import TaskEnv, TaskVectorEnv
@@ -68,6 +69,7 @@ _LAZY = {
     "TaskRollout": "rigid_env.tasks.rollout",
     "TaskState": "rigid_env.tasks.state",
     "check_task": "rigid_env.envs.checks",
+    "load_policy": "rigid_env.envs.policy_files",
     "rollout": "rigid_env.tasks.rollout",
     "show": "rigid_env.viewer.show",
     "to_html": "rigid_env.viewer.show",
@@ -106,6 +108,7 @@ __all__ = [
     "__version__",
     "check_task",
     "compiled",
+    "load_policy",
     "observe",
     "register_envs",
     "register_task",

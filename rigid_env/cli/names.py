@@ -74,6 +74,13 @@ def complete_truth(incomplete: str) -> list[str]:
     return [*_starting(incomplete, accuracy.names()), *_scene_files(incomplete)]
 
 
+def complete_trained(incomplete: str) -> list[str]:
+    """Environments that have a trained policy."""
+    from rigid_env.envs.pretrained import pretrained_ids
+
+    return _starting(incomplete, pretrained_ids())
+
+
 def complete_peers(incomplete: str) -> list[str]:
     """Other engines with commas between them."""
     from rigid_env.lab.measure import peers

@@ -1,4 +1,4 @@
-"""The command that shows something in a browser."""
+"""The commands that show something in a browser."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WHAT = (
 )
 
 POLICY = (
-    "Of an environment: plain arrays (.npz), of which nothing is run, or a model of Stable-Baselines3 (.zip). Its code "
+    "Of an environment: pretrained, which comes with it; plain arrays (.npz), of which nothing is run, or a model of Stable-Baselines3 (.zip). Its code "
     "runs while it is read: take it from those you trust only."
 )
 
@@ -59,6 +59,46 @@ def view(
             return
         _serve(what, host, port, browser, settings, console)
         say(console, "viewer", "ended")
+
+
+@app.command(short_help="Watch a trained agent.")
+def play(
+    env: Annotated[
+        str, typer.Argument(metavar="ID", help="Of an environment that has one.", autocompletion=names.complete_trained)
+    ],
+    episodes: Annotated[int, typer.Option(min=1, help="Of a video.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first episode.")] = 0,
+    accuracy: Annotated[
+        str | None, typer.Option(help="Preset of the engine; balanced by default.", callback=names.checked_preset)
+    ] = None,
+    video: Annotated[Path | None, output_option("--video", ".gif", help="Write episodes instead.")] = None,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="The next free one is taken.")] = 8080,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open a browser here.")] = False,
+) -> None:
+    """Watch the trained agent that comes with an environment, in a browser or as a video.
+
+    No training, and no library of agents, is needed. Ctrl-C or SIGTERM ends it.
+    """
+    with told_errors(), ending_on_sigterm():
+        from rigid_env.envs.pretrained import PRETRAINED, pretrained_path
+
+        pretrained_path(env)  # refused before anything is opened
+        console = make_console()
+        if video is None:
+            from rigid_env.extras import require
+
+            require("view", purpose="the viewer, without --video")
+            settings = {"accuracy": accuracy, "dt": None, "seed": seed, "policy": PRETRAINED, "controller": False}
+            _serve(env, "127.0.0.1", port, browser, settings, console)
+            return
+        from rigid_env.lab.playing import write_video
+
+        make_parents(video)
+        with console.status("playing"):
+            outcomes = write_video(env, video, range(seed, seed + episodes), accuracy or "balanced")
+        for number, outcome in zip(range(seed, seed + episodes), outcomes):
+            say(console, f"seed {number}", outcome)
+        tell_file(video, console)
 
 
 def _export(what: str, path: Path, duration: float, settings: dict, console) -> None:

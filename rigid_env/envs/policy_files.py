@@ -33,6 +33,7 @@ from typing import Any
 import numpy as np
 
 from physics import validation
+from rigid_env.envs.pretrained import is_id, pretrained_path
 from rigid_env.extras import require
 
 MODEL, ARRAYS = ".zip", ".npz"
@@ -64,12 +65,12 @@ Observations = np.ndarray | Mapping[str, np.ndarray]
 
 
 def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]:
-    """Read the policy of a file.
+    """Read the policy of a file, or the trained one that comes with an environment.
 
     Parameters
     ----------
     path : str or Path
-        Its ending decides. ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3,
+        An id such as ``rigid_env/BlockReach-v0``, for the policy that comes with it; else a file, whose ending decides. ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3,
         which needs the extra `agents`; code in it runs while it is read, as a line on standard error says: take it from
         those you trust only.
 
@@ -85,7 +86,9 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     gymnasium.error.DependencyNotInstalled
         It is a model, and the extra is not installed.
     """
-    path = Path(validation.path(path, "policy"))
+    if is_id(os.fspath(validation.path(path, "policy"))) and not Path(path).exists():
+        return Network.load(pretrained_path(os.fspath(path)))
+    path = Path(path)
     allowed = f"allowed are a model of Stable-Baselines3 ({MODEL}) and plain arrays ({ARRAYS})"
     if not path.is_file():
         raise ValueError(f"policy is {str(path)!r}, which is no file; {allowed}")
@@ -212,7 +215,7 @@ class Network:
         """Write the network as ``.npz``, which `path` must end with, for `load_policy`; return the path."""
         if Path(validation.path(path)).suffix.lower() != ARRAYS:
             raise ValueError(f"path is {str(path)!r}; allowed is the ending {ARRAYS}")
-        arrays = {f"{name}{k}": array for k, pair in enumerate(self.layers) for name, array in zip("wb", pair)}
+        arrays = {f"{name}{k}": _short(part) for k, pair in enumerate(self.layers) for name, part in zip("wb", pair)}
         with open(path, "wb") as file:
             np.savez(file, **arrays, activation=self.activation, output=self.output, mean=self.mean, std=self.std)
         return Path(path)
@@ -246,3 +249,9 @@ def _numbers(array: np.ndarray, name: str, axes: int) -> np.ndarray:
     if array.dtype.kind not in "fiu" or array.ndim != axes or array.size == 0 or not np.isfinite(array).all():
         raise ValueError(f"{name} has shape {array.shape} of {array.dtype}; allowed are finite numbers, {axes} axes")
     return array.astype(np.float64)
+
+
+def _short(array: np.ndarray) -> np.ndarray:
+    """Return an array in single precision where that loses nothing."""
+    single = array.astype(np.float32)
+    return single if np.array_equal(single, array) else array

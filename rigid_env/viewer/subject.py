@@ -173,8 +173,9 @@ def _policy(env, policy, controller):
         return _controller(env, policy)
     if isinstance(policy, (str, os.PathLike)):
         from rigid_env.envs.policy_files import load_policy
+        from rigid_env.envs.pretrained import PRETRAINED
 
-        return load_policy(policy)
+        return load_policy(_id_of(env) if os.fspath(policy) == PRETRAINED else policy)
     if hasattr(policy, "predict"):
         from rigid_env.envs.policy_files import greedy
 
@@ -182,6 +183,11 @@ def _policy(env, policy, controller):
     if policy is not None and not callable(policy):
         raise ValueError(f"policy is {shown(policy)}; allowed are a file, a function and a model")
     return policy
+
+
+def _id_of(env) -> str:
+    """Id of an environment; the name of its task where it was made without one."""
+    return env.spec.id if env.spec is not None else type(env.unwrapped.task).__name__
 
 
 def _controller(env, policy):

@@ -1,0 +1,69 @@
+"""Play episodes of a trained policy, and write them as a video."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import gymnasium as gym
+
+from rigid_env.envs.policy_files import load_policy
+from rigid_env.rendering.picture import write_gif
+
+SIZE = (480, 300)  # width and height of the pictures [px]
+FRAME_TIME = 0.05  # between pictures: an exact number of hundredths, in which a GIF counts [s]
+STILL = 10  # times that the last picture of an episode is shown
+
+
+def write_video(env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "balanced") -> list[str]:
+    """Write an animated GIF of one episode for each seed.
+
+    Parameters
+    ----------
+    env_id : str
+        Of an environment with a trained policy.
+    path : Path
+    seeds : iterable of int
+    accuracy : str
+
+    Returns
+    -------
+    list of str
+        How each episode ended.
+
+    Raises
+    ------
+    ValueError
+        If the environment has no trained policy.
+    """
+    policy = load_policy(env_id)
+    width, height = SIZE
+    env = gym.make(env_id, render_mode="rgb_array", width=width, height=height, accuracy=accuracy)
+    pictures, outcomes = [], []
+    for seed in seeds:
+        found, outcome = _episode(env, policy, seed)
+        pictures += found + found[-1:] * STILL
+        outcomes.append(outcome)
+    env.close()
+    write_gif(path, pictures, 1.0 / FRAME_TIME)
+    return outcomes
+
+
+def _episode(env: gym.Env, policy, seed: int) -> tuple[list, str]:
+    """Pictures of an episode, `FRAME_TIME` apart, and how it ended."""
+    control_dt = env.unwrapped.task.control_dt
+    observation, _ = env.reset(seed=seed)
+    pictures, shown, steps, is_over = [env.render()], FRAME_TIME, 0, False
+    while not is_over:
+        batch = (
+            {key: part[None] for key, part in observation.items()}
+            if isinstance(observation, dict)
+            else observation[None]
+        )
+        observation, _, terminated, truncated, info = env.step(policy(batch)[0])
+        steps += 1
+        is_over = terminated or truncated
+        if is_over or steps * control_dt >= shown - 1e-9:
+            pictures.append(env.render())
+            shown += FRAME_TIME
+    return pictures, f"{'success' if info['is_success'] else 'no success'} after {steps * control_dt:.2f} s"
