@@ -1,4 +1,4 @@
-"""Write the policy of a trained agent as plain arrays, for use without torch: ``python -m agents.export RUN_DIR FILE``."""
+"""Write the policy of a trained agent as plain arrays that need no torch: ``python -m agents.export RUN_DIR FILE``."""
 
 from __future__ import annotations
 

@@ -17,7 +17,10 @@ ROW = 26
 # Title and rows of folders of each layer, from top to bottom.
 LAYERS = (
     ("agents", "#fdf1dc", ("training and evaluation of policies",)),
-    ("rigid_env", "#fdf1dc", ("cli · viewer · lab · hard_cases", "envs · suite · rendering", "tasks · launchers · terminal")),
+    (
+        "rigid_env", "#fdf1dc",
+        ("cli · viewer · lab · hard_cases", "envs · suite · rendering", "tasks · launchers · terminal"),
+    ),
     ("physics", "#e3eefb", ("io · work_precision · analysis", "world", "plan · schemes · scene", "mass · parallel")),
     (
         "physics/kernels, compiled", "#dff3e4",
