@@ -144,6 +144,11 @@ def default_algorithm(env: str, path: Path = HYPERPARAMETERS) -> str:
     return next(iter(_entries(env, path)))
 
 
+def environments_of(path: Path = HYPERPARAMETERS) -> list[str]:
+    """Ids of all environments in a file of hyperparameters."""
+    return list(yaml.safe_load(path.read_text(encoding="utf-8")))
+
+
 def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
     """The entries of an environment, by algorithm."""
     table = yaml.safe_load(path.read_text(encoding="utf-8"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import os
 from collections import deque
 from dataclasses import asdict, dataclass, field, fields
@@ -92,6 +93,13 @@ def write_curve(points: list[CurvePoint], path: Path) -> None:
         writer.writeheader()
         writer.writerows(asdict(point) for point in points)
     os.replace(partial, path)
+
+
+def read_curve(path: Path) -> list[dict[str, float | None]]:
+    """Read a learning curve as `write_curve` wrote it, a dict for each point; what is nan becomes None."""
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
+    return [{name: value if math.isfinite(value) else None for name, value in row.items()} for row in rows]
 
 
 def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) -> None:

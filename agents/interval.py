@@ -1,25 +1,26 @@
-"""Confidence interval of a success rate."""
+"""Confidence intervals: of a success rate, and of a mean over few runs."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 
-Z_95 = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
+import numpy as np
+from scipy import stats
+
+CONFIDENCE = 0.95
+RESAMPLES = 10_000
+TRIMMED = 0.25  # share of the runs that the interquartile mean leaves out at each end
 
 
-def wilson(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
-    """Wilson score interval of a binomial proportion.
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson score interval of a binomial proportion at 95 %, by SciPy.
 
-    The set of p whose distance from the observed share is at most z standard errors *under p*:
-    ``(share - p)² <= z² p (1 - p) / trials``. Unlike the interval of the textbooks (Wald) it stays within
-    [0, 1] and keeps its width at shares of 0 and 1.
+    Unlike the interval of the textbooks (Wald) it stays within [0, 1] and keeps its width at shares of 0 and 1.
 
     Parameters
     ----------
     successes, trials : int
         0 <= successes <= trials, trials >= 1.
-    z : float
-        Quantile of the normal distribution; the default makes a 95 % interval.
 
     Returns
     -------
@@ -37,9 +38,25 @@ def wilson(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
     """
     if not (trials >= 1 and 0 <= successes <= trials):
         raise ValueError(f"successes is {successes} of {trials} trials; allowed is 0 to trials, at least 1 trial")
-    share, weight = successes / trials, z * z / trials
-    centre = (share + weight / 2) / (1 + weight)
-    half_width = math.sqrt(weight * (share * (1 - share) + weight / 4)) / (1 + weight)
-    low = 0.0 if successes == 0 else centre - half_width
-    high = 1.0 if successes == trials else centre + half_width
-    return low, high
+    found = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
+    return float(found.low), float(found.high)
+
+
+def interquartile_mean(values: Sequence[float]) -> float:
+    """Mean of the middle half of some runs' numbers, on which one lucky or failed run has no hold."""
+    return float(stats.trim_mean(values, TRIMMED))
+
+
+def bootstrap(values: Sequence[float]) -> tuple[float, float]:
+    """Bootstrap interval (percentiles, 95 %) of the interquartile mean of some runs' numbers.
+
+    One run says nothing about others: its interval is (nan, nan).
+    """
+    if len(values) < 2:
+        return float("nan"), float("nan")
+    found = stats.bootstrap(
+        (np.asarray(values, dtype=np.float64),), lambda x, axis: stats.trim_mean(x, TRIMMED, axis=axis),
+        n_resamples=RESAMPLES, confidence_level=CONFIDENCE, method="percentile", vectorized=True,
+        random_state=np.random.default_rng(0),
+    )  # fmt: skip
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)

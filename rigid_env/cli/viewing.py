@@ -18,8 +18,8 @@ WHAT = (
 )
 
 POLICY = (
-    "Of an environment: pretrained, which comes with it; plain arrays (.npz), of which nothing is run, or a model of Stable-Baselines3 (.zip). Its code "
-    "runs while it is read: take it from those you trust only."
+    "Of an environment: pretrained, which comes with it; plain arrays (.npz), of which nothing is run; or a model of "
+    "Stable-Baselines3 (.zip). Its code runs while it is read: take it from those you trust only."
 )
 
 

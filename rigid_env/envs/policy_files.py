@@ -70,9 +70,9 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     Parameters
     ----------
     path : str or Path
-        An id such as ``rigid_env/BlockReach-v0``, for the policy that comes with it; else a file, whose ending decides. ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3,
-        which needs the extra `agents`; code in it runs while it is read, as a line on standard error says: take it from
-        those you trust only.
+        An id such as ``rigid_env/BlockReach-v0``, for the policy that comes with it; else a file, whose ending decides.
+        ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3, which needs the extra
+        `agents`; code in it runs while it is read, as a line on standard error says: take it from those you trust only.
 
     Returns
     -------

@@ -55,12 +55,7 @@ def _episode(env: gym.Env, policy, seed: int) -> tuple[list, str]:
     observation, _ = env.reset(seed=seed)
     pictures, shown, steps, is_over = [env.render()], FRAME_TIME, 0, False
     while not is_over:
-        batch = (
-            {key: part[None] for key, part in observation.items()}
-            if isinstance(observation, dict)
-            else observation[None]
-        )
-        observation, _, terminated, truncated, info = env.step(policy(batch)[0])
+        observation, _, terminated, truncated, info = env.step(policy(observation[None])[0])
         steps += 1
         is_over = terminated or truncated
         if is_over or steps * control_dt >= shown - 1e-9:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigid_env.launchers import load
-from rigid_env.launchers.job import Ended, Job
+from rigid_env.launchers.job import Ended, Job, Launch
 
 
 @dataclass(frozen=True)
@@ -46,4 +46,9 @@ class Place:
 
     def run(self, jobs: Sequence[Job]) -> Iterator[Ended]:
         """Run jobs, and yield the end of each as it comes, in any order."""
-        return load(self.launcher)(jobs, self.folder, self.at_once, self.address)
+        return self.launch(jobs, self.folder, self.at_once, self.address)
+
+    @property
+    def launch(self) -> Launch:
+        """Function of the launcher."""
+        return load(self.launcher)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
-from agents.interval import Z_95, wilson
+from agents.interval import bootstrap, interquartile_mean, wilson
+
+Z_95 = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
 
 
 @pytest.mark.parametrize(
@@ -33,3 +38,23 @@ def test_all_or_nothing_stays_within_zero_and_one():
 def test_impossible_counts_are_refused(successes, trials):
     with pytest.raises(ValueError, match="allowed is 0 to trials"):
         wilson(successes, trials)
+
+
+def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():
+    assert interquartile_mean([0.0, 0.9, 0.92, 1.0]) == pytest.approx(0.91)
+    assert interquartile_mean([0.5]) == 0.5
+
+
+def test_a_bootstrap_interval_covers_its_mean_as_often_as_it_says():
+    """Of 100 samples of 20 normal numbers; 95 % less what few numbers cost, which is about 4 %."""
+    rng = np.random.default_rng(0)
+    covered = 0
+    for _ in range(100):
+        low, high = bootstrap(rng.normal(size=20))
+        covered += low <= 0.0 <= high
+    # binomial deviation of 100 at 0.91: 2.9; four of them
+    assert 100 * 0.91 - 4 * 2.9 <= covered <= 100
+
+
+def test_one_run_has_no_interval():
+    assert all(math.isnan(end) for end in bootstrap([0.5]))

@@ -1,0 +1,205 @@
+"""Train and judge agents on every environment: ``python -m agents.suite [ENV...] --seeds 0-4 --out DIR``.
+
+Trials are those of `agents.sweep`: they run on any launcher, and the same command goes on with what was ended. Each
+complete trial is a file of results, and each environment another one with what chance and a hand reach. Pages are made
+of them by `benchmarks.environment_pages`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from gymnasium.error import DependencyNotInstalled
+from rich.console import Console
+
+from agents.accuracy_transfer import parse_accuracies
+from agents.baselines import CONTROLLERS, baseline_policy
+from agents.config import HYPERPARAMETERS, RunFolder, environments_of
+from agents.curve import read_curve
+from agents.evaluate import evaluate
+from agents.interval import bootstrap, interquartile_mean
+from agents.run import EVALUATION_EPISODES
+from agents.sweep import INTERRUPTED, complete, sweep
+from agents.trials import Trial, make_trials, parse_seeds
+from physics.accuracy import PRESETS
+from rigid_env.lab.measure.machine import write_json
+from rigid_env.launchers import LAUNCHERS
+from rigid_env.launchers.job import Job
+from rigid_env.launchers.place import Place
+from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
+
+RESULTS = Path("benchmarks/results/suite")
+JUDGED_EPISODES = 200  # at each preset
+CURVE_POINTS = 60  # kept of a learning curve
+
+
+def short_name(env_id: str) -> str:
+    """Name of an environment in files: BlockReach-v0 of ``rigid_env/BlockReach-v0``."""
+    return env_id.rpartition("/")[2]
+
+
+# --- what is measured ------------------------------------------------------------------------------------------------
+
+
+def judge_trial(trial: Trial, out: str) -> dict[str, Any]:
+    """Judge a complete trial's policy at every preset of the engine; returns success rates by preset."""
+    from agents.checkpoint import load_policy
+
+    config, policy = load_policy(RunFolder(Path(out) / trial.name))
+    return {
+        accuracy: evaluate(config.env, policy, JUDGED_EPISODES, config.seed,
+                           **{**config.evaluation_arguments, "accuracy": accuracy})
+        for accuracy in PRESETS
+    }  # fmt: skip
+
+
+def measure_floors(env_id: str) -> dict[str, Any]:
+    """Evaluate random actions and, where there is one, the controller written by hand; returns both by name."""
+    names = ["random", *(["controller"] if env_id in CONTROLLERS else [])]
+    return {
+        name: evaluate(env_id, baseline_policy(name, env_id), EVALUATION_EPISODES, 0, accuracy="balanced")
+        for name in names
+    }
+
+
+# --- files of results ------------------------------------------------------------------------------------------------
+
+
+def trial_file(results: Path, trial: Trial) -> Path:
+    """File of a trial's results."""
+    return results / f"{trial.name}.json"
+
+
+def floors_file(results: Path, env_id: str) -> Path:
+    """File of an environment's floors."""
+    return results / f"{short_name(env_id)}-floors.json"
+
+
+def write_trial(results: Path, trial: Trial, out: Path, result: dict[str, Any], judged: dict[str, Any]) -> None:
+    """Write what a trial reached, with the machine, the versions and the commit."""
+    curve = read_curve(RunFolder(out / trial.name).curve)
+    every = max(1, len(curve) // CURVE_POINTS)
+    content = {**result, "accuracy": trial.config.accuracy, "is_default": "accuracy" not in trial.settings}
+    del content["run"]
+    write_json(trial_file(results, trial), {**content, "judged": judged, "curve": [*curve[::every], curve[-1]]})
+
+
+def is_written(path: Path, result: dict[str, Any] | None = None) -> bool:
+    """Return whether a file of results is there, of this very result of a trial."""
+    if not path.is_file():
+        return False
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    return result is None or kept["evaluation"] == result["evaluation"]
+
+
+# --- the command -----------------------------------------------------------------------------------------------------
+
+
+def write_results(trials: Sequence[Trial], out: Path, results: Path, place: Place, console: Console) -> list[str]:
+    """Judge complete trials and measure floors that are not yet written, on the launcher; returns errors."""
+    done = complete(trials, out)
+    by_name = {
+        f"judge {t.name}": t for t in trials if t.name in done and not is_written(trial_file(results, t), done[t.name])
+    }
+    floors = {f"floors of {env}": env for env in dict.fromkeys(t.config.env for t in trials)
+              if not is_written(floors_file(results, env))}  # fmt: skip
+    jobs = [Job(name, partial(judge_trial, trial, str(out)), "") for name, trial in by_name.items()]
+    jobs += [Job(name, partial(measure_floors, env), "") for name, env in floors.items()]
+    errors = []
+    with progress_bar(console) as bar:
+        task = bar.add_task("judging", total=len(jobs))
+        for name, found, error in place.run(jobs) if jobs else ():
+            bar.update(task, advance=1, description=name)
+            if found is None:
+                errors.append(f"{name}: {error}")
+            elif name in floors:
+                write_json(floors_file(results, floors[name]), {"env": floors[name], "floors": found})
+            else:
+                trial = by_name[name]
+                write_trial(results, trial, out, done[trial.name], found)
+    return errors
+
+
+def read_results(results: Path, env_id: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Read the results of an environment's trials, and its floors by name."""
+    files = sorted(results.glob(f"{short_name(env_id)}-*-s*.json"))
+    floors = floors_file(results, env_id)
+    kept = json.loads(floors.read_text(encoding="utf-8"))["floors"] if floors.is_file() else {}
+    return [json.loads(path.read_text(encoding="utf-8")) for path in files], kept
+
+
+def aggregate(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Sum up the trials of one environment and algorithm: interquartile means over seeds, with bootstrap intervals."""
+    rates = [each["evaluation"]["success_rate"] for each in found]
+    return {
+        "seeds": len(found), "success": interquartile_mean(rates), "interval": bootstrap(rates), "lowest": min(rates),
+        "steps": interquartile_mean([each["steps"] for each in found]),
+        "seconds": interquartile_mean([each["training_seconds"] for each in found]),
+    }  # fmt: skip
+
+
+def make_table(env_ids: Sequence[str], results: Path) -> Table:
+    """Table of all environments: what was reached, after how long, and the floors."""
+    columns = number_columns("seeds", "success", "lowest", "M steps", "s", "controller", "random")
+    table = Table(["environment", "by", *columns], "suite")
+    for env_id in env_ids:
+        found, floors = read_results(results, env_id)
+        rates = [f"{floors[name]['success_rate']:.1%}" if name in floors else "" for name in ("controller", "random")]
+        for algo in sorted({each["algo"] for each in found if each["is_default"]}):
+            whole = aggregate([each for each in found if each["algo"] == algo and each["is_default"]])
+            table.add_row(
+                short_name(env_id), algo, str(whole["seeds"]), f"{whole['success']:.1%}", f"{whole['lowest']:.1%}",
+                f"{whole['steps'] / 1e6:.2f}", f"{whole['seconds']:.0f}", *rates,
+            )  # fmt: skip
+    return table
+
+
+def main(
+    env: Annotated[list[str] | None, typer.Argument(help="Gymnasium ids; none: all that have hyperparameters.")] = None,
+    seeds: Annotated[str, typer.Option(help="Numbers and ranges: 0-4 or 1,3,7.")] = "0-4",
+    accuracy: Annotated[
+        str | None, typer.Option(help="Train at these presets, with commas, to judge at the others.")
+    ] = None,
+    hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
+    out: Annotated[Path, typer.Option(help="Folder of the runs; every worker sees it.")] = Path("suite"),
+    results: Annotated[Path, typer.Option(help="Folder of the files of results.")] = RESULTS,
+    launcher: Annotated[str, typer.Option(help=f"{', '.join(LAUNCHERS)}, without print.")] = "local",
+    jobs: Annotated[int, typer.Option(min=1, help="Trials at once.")] = 2,
+    address: Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")] = None,
+) -> None:
+    """Train and judge agents on all environments. The same command goes on with what was ended."""
+    console = make_console()
+    try:
+        env_ids = list(env or environments_of(hyperparameters))
+        grid = {} if accuracy is None else {"accuracy": parse_accuracies(accuracy)}
+        trials = make_trials(env_ids, parse_seeds(seeds), grid, None, hyperparameters)
+        place = Place(launcher, out.resolve(), jobs, address)
+        if place.is_printed:
+            raise ValueError(
+                "launcher is 'print', which runs nothing; allowed is agents.sweep with it, and then this one"
+            )
+        ends = sweep(trials, out.resolve(), place.launch, jobs, address, console)
+        errors = write_results(trials, out.resolve(), results, place, console)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    except DependencyNotInstalled as error:
+        console.print(f"Error: {error}", soft_wrap=True)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
+        raise typer.Exit(INTERRUPTED) from None
+    console.print(make_table(env_ids, results))
+    errors += [f"{each.name}: {each.error}" for each in ends if each.result is None]
+    for error in errors:
+        console.print(f"Error: {error}", soft_wrap=True)
+    if errors:
+        raise typer.Exit(1)
+
+
+if __name__ == "__main__":
+    run_program(main)
