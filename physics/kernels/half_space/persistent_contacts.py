@@ -15,15 +15,15 @@ from physics.kernels.state.body import angular_velocity, apply_inv_inertia, prin
 from physics.kernels.state.layout import ELLIPSOID
 
 # Row of a body in `memory`: length of its last resting stage [s], number of contacts in that stage, the direct solver
-# that succeeded last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of these contacts, then three
-# impulses [N s] for every possible slot, zero where there was no contact.
+# that succeeded last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of these contacts, then
+# three impulses [N s] for every possible slot, zero where there was no contact.
 WALL_MEMORY_STAGE, WALL_MEMORY_COUNT, WALL_MEMORY_MODE = range(3)
 WALL_MEMORY_HEAD = 3
 
 
 @inlined
 def last_normal_impulse(slot, memory, scratch):
-    """Normal impulse at a contact slot in the last stage of the workspace's body [N s]; 0 if it had no contact there."""
+    """Normal impulse of the workspace's body at a contact slot in its last stage [N s]; 0 without contact there."""
     return memory[scratch.body.i, WALL_MEMORY_HEAD + scratch.contacts.slot.shape[0] + 3 * slot]
 
 

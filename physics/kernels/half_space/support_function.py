@@ -18,7 +18,7 @@ from physics.compiler.simd import Lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import BLOCK, SPHERE, VERTEX_COUNT
 
-# Signs of the coordinates of each vertex of a block. Bit j of a vertex's number is set if it is on the + side of axis j.
+# Signs of the coordinates of a block's vertices. Bit j of a vertex's number is set if it is on the + side of axis j.
 VERTEX_SIGNS = np.array([[1.0 if vertex >> j & 1 else -1.0 for j in range(3)] for vertex in range(VERTEX_COUNT)])
 
 
