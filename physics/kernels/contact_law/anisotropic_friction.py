@@ -37,10 +37,10 @@ friction_ratio = law_parameter(LAW_ANISOTROPY, 1.0)
 
 @inlined
 def stretched_frame(K, u, w, k):
-    """Stretch the motion of a body along tangent 2 of a wall by the factor k: (K', u', w') of the module docstring.
+    """Stretch the motion of a body along tangent 2 of a wall by the factor k: return stretched (K, u, w).
 
-    All are in the frame (normal, tangents) of the wall: K the inverse inertia (00, 01, 02, 11, 12, 22), u the velocity,
-    w the angular velocity.
+    K is the inverse inertia (00, 01, 02, 11, 12, 22), u the velocity and w the angular velocity, all in the frame
+    (normal, tangent 1, tangent 2) of the wall.
     """
     s = 1.0 / k
     return (
@@ -86,7 +86,7 @@ def _as_it_is(vector, axes, body):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def unstretch_force(f, axes, body):
-    """Convert a contact force f to stretched tangents, S⁻¹ f, so that the isotropic friction law with μ1 holds for it.
+    """Divide the component of a contact force f along tangent 2 by μ2/μ1, so that friction is isotropic, with μ1.
 
     `axes` are normal and tangents of the wall; f and the result are in the world frame.
     """
@@ -97,9 +97,10 @@ def unstretch_force(f, axes, body):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def sliding_direction(d, axes, body):
-    """Vector e = S² d/|S d| that gives the friction force -μ1 f_n e of a contact that slides along the unit vector d.
+    """Vector e that gives the friction force -μ1 f_n e of a contact that slides along the unit vector d.
 
-    `axes` are normal and tangents of the wall; d and e are in the world frame. If both coefficients are equal, e = d.
+    e = S² d/|S d|, where S multiplies the component along tangent 2 by μ2/μ1. `axes` are normal and tangents of the
+    wall; d and e are in the world frame. If both coefficients are equal, e = d.
     """
     k = friction_ratio(body)
     a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)

@@ -100,7 +100,7 @@ def _no_aim(*arguments):
 
 @if_law((LAW_STIFFNESS,), _no_aim)
 def set_spring_targets(n, x, motion, before, after, offset_frame, scratch):
-    """Set the normal targets of n compliant contacts and the γ of the stage, after `set_resting_targets`.
+    """Set the normal targets of n compliant contacts and the compliance γ of the stage, after `set_resting_targets`.
 
     The stage has two drifts, `before` and `after` [s] long. x and `motion` (`StageMotion`) are position and motion of
     the body between them, before the impulses. `contacts.gap` has the gaps at the start. Written are `contacts.target`,
@@ -152,7 +152,8 @@ def _as_it_ends(n, y, end, h, offset_frame, report, scratch):
 def _lifted(n, x, R, share, offset_frame, scratch):
     """Move the position x out of walls until no contact point is deeper than `share` of its due depth; return it.
 
-    R is the body's rotation matrix. Due depths are those of negative gaps in `contacts.end_gap`.
+    A due depth is that which the contact problem has foretold, a negative gap in `contacts.end_gap`. R is the body's
+    rotation matrix.
     """
     contacts = scratch.contacts
     least = NEGLIGIBLE_SLOP_SHARE * scratch.body.slop
@@ -209,9 +210,10 @@ def _without_excess(y, end, excess, h, offset_frame, report, scratch):
 
 @if_law((LAW_STIFFNESS,), _as_it_ends)
 def correct_spring_depth(n, y, end, h, offset_frame, report, scratch):
-    """Correct the end of a compliant stage of length h from y to `end`: lift contact points to their due depths.
+    """Correct the end of a compliant stage of length h from y to `end`: lift contact points that are too deep.
 
-    Returns the corrected end. Contact points outside the set are moved out of walls. The springs then store at most the
+    A point is too deep below its due depth, which the contact problem has foretold (`contacts.end_gap`). Returns the
+    corrected end. Contact points outside the set are moved out of walls. The springs then store at most the
     sum of their energy before, of the loss of kinetic energy, and of the work of loads; the body is lifted further
     where they store more. (Damping stops a point at the turning rate of the stage's start. It leaves the point too deep
     if the impulses have slowed the turning.) Friction coefficients far above 1 may push a turning point by more than
@@ -244,7 +246,7 @@ def _as_it_is(block, body):
 
 @if_law((LAW_STIFFNESS,), _as_it_is)
 def add_block_compliance(W, body):
-    """Add γ to the normal entry of W, the 3 x 3 Delassus block of a contact with itself, nine scalars row by row."""
+    """Add the compliance γ to the normal entry of W, a contact's own Delassus block, nine scalars row by row."""
     return W[0] + body.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
 
 
@@ -254,7 +256,7 @@ def _as_assembled(n, width, scratch):
 
 @if_law((LAW_STIFFNESS,), _as_assembled)
 def add_delassus_compliance(n, width, scratch):
-    """Add γ to the normal diagonal entries of the assembled Delassus matrix, which has `width` rows per contact."""
+    """Add the compliance γ to the normal diagonal entries of the Delassus matrix, with `width` rows per contact."""
     for i in range(n):
         scratch.contacts.delassus[width * i, width * i] += scratch.body.give
 
@@ -265,8 +267,9 @@ def _unyielding(value, rho, body):
 
 @if_law((LAW_STIFFNESS,), _unyielding)
 def scale_by_compliance(value, rho, body):
-    """Divide `value` by 1 + ρ γ: the normal impulse of a proximal step at a compliant wall, or its slope.
+    """Divide `value` by 1 + ρ γ, with ρ = `rho` and the compliance γ of contact; without compliance it stays the same.
 
-    Without compliance the impulse is `value` = q - ρ u. With it, p = q - ρ (u + γ p) gives p = (q - ρ u)/(1 + ρ γ).
+    `value` = q - ρ u is the normal impulse of a proximal step at a rigid wall. At a compliant wall
+    p = q - ρ (u + γ p) gives p = (q - ρ u)/(1 + ρ γ). The slope of the impulse has the same factor.
     """
     return value / (1.0 + rho * body.give)

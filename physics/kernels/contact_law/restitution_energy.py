@@ -49,7 +49,7 @@ def lift_conserving_energy(z, y, offset_frame, body):
 
 @inlined
 def rebound_share(before, plastic, full, middle):
-    """Largest s in [0, 1] at which the energy is at most `before`.
+    """Largest share s of an impact's rebound, in [0, 1], at which the energy after it is at most `before` [J].
 
     `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]. The energy is the parabola
     f(s) = plastic + B s + C s² with C = 2 (full + plastic) - 4 middle >= 0, and f(1) > before >= f(0). Its root is

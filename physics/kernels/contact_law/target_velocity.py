@@ -50,7 +50,10 @@ class TargetLimits(NamedTuple):
 
 @inlined
 def may_have_impact(bounce_speed, slop_speed, scratch):
-    """True if a contact of the set approaches fast enough for an impact, so that `set_impact_targets` is needed."""
+    """True if a contact of the set approaches fast enough for an impact, so that `set_impact_targets` is needed.
+
+    The limit is `slop_speed` [m/s], or `bounce_speed` if that is smaller and the body has a restitution.
+    """
     return scratch.contacts.approach > (min(bounce_speed, slop_speed) if scratch.body.restitution > 0.0 else slop_speed)
 
 

@@ -66,7 +66,8 @@ class PyramidProblem(NamedTuple):
     Attributes
     ----------
     M : (m, m) float64
-        Matrix: w_scale W between normals and directions, and the rows of the cones (module docstring).
+        Matrix: the Delassus matrix W between normals and directions, times w_scale, a power of two, and the rows of
+        the cones (module docstring).
     q : (m,) float64
         Right-hand side [m/s].
     z : (m,) float64

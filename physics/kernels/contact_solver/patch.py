@@ -59,9 +59,9 @@ class PatchProblem(NamedTuple):
 
 
 class NormalMotion(NamedTuple):
-    """Motion of the body along and across a wall's normal that brings the pushing contacts to their normal targets.
+    """Velocity along a wall's normal and turning about its tangents, by which pushing contacts meet normal targets.
 
-    It is known before the impulses are.
+    This motion is known before the impulses are.
 
     Attributes
     ----------

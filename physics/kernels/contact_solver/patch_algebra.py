@@ -53,7 +53,7 @@ def largest_free_speed(friction, patch, body):
 
 @inlined
 def patch_centroid(count, patch, on):
-    """Centroid (normal, tangents) of the `count` pushing contacts [m]."""
+    """Centroid (normal, tangents) of the `count` pushing contacts of a patch, those with `on` = 1 [m]."""
     c, a, b = patch.points
     s = 1.0 / count
     return s * lane_sum(on * c), s * lane_sum(on * a), s * lane_sum(on * b)
@@ -61,10 +61,11 @@ def patch_centroid(count, patch, on):
 
 @inlined
 def fit_normal_motion(count, patch, on):
-    """Fit a normal motion to the normal targets of the `count` pushing contacts, by least squares.
+    """Fit a normal motion to the normal targets of the `count` pushing contacts (`on` = 1), by least squares.
 
-    Returns (is_patch, centroid of the contacts [m], (v_n, ω_a, ω_b)). If the contacts are on a line, is_patch is False,
-    and the motion is inaccurate or not finite.
+    The motion is (v_n, ω_a, ω_b): the velocity along the wall's normal, and the angular velocities about its tangents.
+    Returns (is_patch, centroid of the contacts [m], motion). If the contacts are on a line, is_patch is False, and the
+    motion is inaccurate or not finite.
     """
     _, a, b = patch.points
     target = patch.targets[0]
@@ -117,7 +118,11 @@ def patch_friction_directions(ua, ub, on, mu):
 
 @inlined
 def patch_slip_velocities(patch, motion, normal):
-    """Tangential velocities of the contacts less their targets [m/s], at a planar motion and a `NormalMotion`."""
+    """Tangential velocities of the contacts of a patch less their targets [m/s], two lanes.
+
+    `motion` is the body's planar motion (v_a, v_b, ω_n), along the wall and about its normal; `normal` is a
+    `NormalMotion`.
+    """
     c, a, b = patch.points
     _, target_a, target_b = patch.targets
     wa, wb = normal.wa, normal.wb
@@ -126,9 +131,9 @@ def patch_slip_velocities(patch, motion, normal):
 
 @inlined
 def solve_normal_slopes(patch, on, normal, friction, K):
-    """Solve for the slopes y_1, y_2 of the normal impulses that lead to a `NormalMotion`, with a `PatchFriction`.
+    """Solve for the slopes y_1, y_2 of normal impulses, affine in the place on the wall, that lead to a `NormalMotion`.
 
-    K is the inverse inertia of the body.
+    `friction` is the `PatchFriction` that goes with them, and K the inverse inertia of the body.
 
     Returns
     -------
@@ -155,9 +160,10 @@ def solve_normal_slopes(patch, on, normal, friction, K):
 
 @inlined
 def planar_compliance(problem, normal, friction, turning, body):
-    """Planar compliance C: planar motion per planar impulse at the centroid, nine numbers row by row.
+    """Planar compliance C: change of the planar motion (v_a, v_b, ω_n) per planar impulse at the contacts' centroid.
 
-    y_1 and y_2 respond to the impulse, so that the normal motion stays the same. `friction` and `turning` are those of
+    It is nine numbers, row by row. The slopes y_1 and y_2 respond to the impulse, so that the normal motion stays the
+    same. `friction` and `turning` are those of
     `solve_normal_slopes`. `body` is the body's record.
     """
     _, a, b = problem.patch.points
@@ -218,7 +224,10 @@ def patch_normal_impulses(patch, on, normal, y, friction):
 
 @inlined
 def planar_motion_after(exerted, body, scratch):
-    """Planar motion of a body after contact impulses with the sums `exerted`; `body` is the `FreeBody` before."""
+    """Planar motion (v_a, v_b, ω_n) of a body after contact impulses with the sums `exerted`.
+
+    `body` is the `FreeBody` before them.
+    """
     fa, fb, tn, ta, tb = exerted
     u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(scratch.body)
     mass_b = ratio * ratio * inv_mass
@@ -264,9 +273,9 @@ def patch_sliding_residual(patch, p, friction, mu, delta):
 
 @inlined
 def has_turned_far(on, d, size, change):
-    """Mask of pushing contacts whose slip velocity turns by more than about 70 degrees when `change` [m/s] is added.
+    """Mask of pushing contacts (`on` = 1) whose slip turns by more than about 70 degrees when `change` [m/s] is added.
 
-    d are the directions of the slips, `size` their speeds [m/s].
+    d are the directions of the slip velocities, `size` their sizes [m/s].
     """
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
@@ -274,7 +283,7 @@ def has_turned_far(on, d, size, change):
 
 @inlined
 def has_small_turns(patch, on, friction, mu, step):
-    """True if a `step` of the planar motion turns no sliding direction by more than about 70 degrees."""
+    """True if a `step` of the planar motion (v_a, v_b, ω_n) turns no slip by more than about 70 degrees."""
     _, a, b = patch.points
     x, y, size = friction
     s = -1.0 / mu

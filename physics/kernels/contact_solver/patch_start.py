@@ -21,7 +21,7 @@ _MIN_SLIP_SHARE = 0.01
 
 @inlined
 def warm_start_motion(n, patch, on, body, scratch):
-    """Planar motion after the warm-start impulses in `scratch`, and whether these belong to the present loads.
+    """Planar motion (v_a, v_b, ω_n) after the warm-start impulses, and whether these belong to the present loads.
 
     `on` is 1 in the lanes of the n contacts, 0 in a surplus lane.
     """
@@ -87,7 +87,7 @@ def may_stick(n, axes, v, L, scratch):
 
 @inlined
 def cold_start_motion(n, patch, on, mu, body):
-    """Estimate the planar motion of a body after friction at a face, by an ellipsoidal limit surface.
+    """Estimate the planar motion (v_a, v_b, ω_n) of a body after friction at a face, by an ellipsoidal limit surface.
 
     `body` is the body without impulses, mu its friction coefficient, and `on` is 1 in the lanes of the n contacts.
 

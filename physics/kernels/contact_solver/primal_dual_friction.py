@@ -113,7 +113,7 @@ class SlipLimits(NamedTuple):
 
 @inlined
 def solve_planar_step(compliance, h, r):
-    """Solve (1 + C H) Δ = r for the step Δ of the planar motion, by Cramer's rule.
+    """Solve (1 + C H) Δ = r for the step Δ of the planar motion (v_a, v_b, ω_n), by Cramer's rule.
 
     `compliance` is C and h is H, each nine numbers row by row.
     """

@@ -56,8 +56,9 @@ _ROUND_TOLERANCE_SHARE = 0.01
 def _fixed_point_residual(n, factor, inv_mass, scratch):
     """Compute the defect x - M⁻¹ Jᵀ p(x) of the twist x in `solver.twist`; return its size as a velocity [m/s].
 
-    The defect goes to `solver.defect`, and p(x) to `solver.trial`. `contacts.velocity` gets q - ρ u, at which the
-    derivative of the law is taken. `factor` is ρ in units of each contact's normal mass.
+    p(x) are the impulses of the contact law, projected from q - ρ u(x), with the present impulses q. The defect goes to
+    `solver.defect`, p(x) to `solver.trial`, and q - ρ u to `contacts.velocity`. `factor` is ρ in units of each
+    contact's normal mass.
     """
     body, contacts, solver = scratch.body, scratch.contacts, scratch.solver
     frame, angular, response = contacts.frame, contacts.angular, contacts.response

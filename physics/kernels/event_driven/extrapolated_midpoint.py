@@ -258,8 +258,8 @@ def _set_first_rate(offset_frame, scratch, motion):
 def _begin_slide(P, offset_frame, scratch, motion):
     """Prepare a step with a single contact, which slides; P is the matrix of the principal axes.
 
-    If the contact creeps or begins to slide, its direction is that of `slip_onset`, and the turning rate of this
-    direction is set.
+    If the contact begins to slide, or is still as slow (`is_creeping`), its direction is that of `slip_onset`, and the
+    turning rate of this direction is set.
     """
     contacts = motion.contacts
     contacts.friction_turn_stiffness = friction_turn_stiffness(P, scratch, motion)

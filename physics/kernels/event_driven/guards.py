@@ -227,7 +227,7 @@ def opposite_face_contact(slot, wall, scene, contacts):
 
 @kernel
 def least_force_margin(slack, scratch, motion):
-    """Smallest margin of the force guards: (margin [weights], GUARD_ code, contact or slot).
+    """Smallest margin of the force guards push, cone and load: (margin [weights], GUARD_ code, contact or slot).
 
     `slack` [weights] is added to each margin, so that rounding does not count.
     """

@@ -41,7 +41,8 @@ _ALL_AT_ONCE = -1
 def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
     """Target normal velocity of a contact that approaches with `speed` [m/s] in an impact.
 
-    A contact rebounds at e times its speed if this is above the rest speed. A leaving contact (speed < 0) may be
+    A contact rebounds at e times its speed, unless this is below `thresholds.rest_speed`, which counts as zero. A
+    leaving contact (speed < 0) may be
     reversed, to approach at e times its speed and collide next. If it were only stopped, its impulse would do work on
     it, and the energy would grow.
 

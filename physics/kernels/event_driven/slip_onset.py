@@ -103,13 +103,16 @@ def _is_small(share, speed, body, motion):
 
 @inlined
 def is_creeping(growth, speed, body, motion):
-    """True if the only contact creeps: its slip `speed` [m/s] and the `growth` of that [m/s²] are within the limits."""
+    """True if the only contact creeps: it begins to slide so slowly that loads alone determine its direction.
+
+    Its slip `speed` [m/s] and the `growth` of this speed [m/s²] must be below their limits.
+    """
     return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, body, motion)
 
 
 @inlined
 def has_outrun_creep(h, scratch, motion):
-    """True if the only contact begins to slide in a step of h [s], but is too fast at its end to count as creeping.
+    """True if the only contact begins to slide in a step of h [s], but is too fast at its end to creep (`is_creeping`).
 
     `set_contact_kinematics` must have been called for the end of the step.
     """

@@ -127,10 +127,10 @@ attitude_series = kernel(write_attitude_series)
 
 @inlined
 def _half_angle(x, square):
-    """Scalar part e0 of the step's quaternion, and 1/e0, from x = |e0 e|²: e0² = (1 + √(1 - 4x)) / 2.
+    """Scalar part e0 of a unit quaternion (e0, e), and 1/e0, from x = |e0 e|²: e0² = (1 + √(1 - 4x)) / 2.
 
-    `square` is the squared angle of the step [rad²]. Power series replace two square roots, one after the other, which
-    would take longer. 4x is sin² of an angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms,
+    `square` is the squared angle of the rotation [rad²]. Power series replace two square roots, one after the other,
+    which would take longer. 4x is sin² of an angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4. The first neglected terms,
     29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
     """
     xx = x * x
@@ -145,7 +145,7 @@ def _half_angle(x, square):
 
 @inlined
 def _part(q, m_body, J_body, c, mm, energy2, square, h):
-    """Quaternion and body momentum after a time h in which the body turns by at most `PART_ANGLE_LIMIT`.
+    """Quaternion and body momentum after a free rotation over h [s], by an angle of at most `PART_ANGLE_LIMIT`.
 
     m_body is the momentum m in the principal frame, J_body the inverse moments and c the coefficients of
     `attitude_series`. mm is |m|², energy2 is 2E, and `square` is a bound of the squared angle of the turn [rad²].
@@ -250,9 +250,9 @@ def _turn_steadily(q, L, mm, energy2, h):
 
 @inlined
 def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
-    """Quaternion after the time h, in equal parts of at most `PART_ANGLE_LIMIT`; `angle` bounds the whole turn [rad].
+    """Quaternion after a free rotation over h [s], by at most `angle` [rad], in parts of at most `PART_ANGLE_LIMIT`.
 
-    q is the quaternion and m the momentum in the principal frame at the start; mm is |m|², energy2 is 2E.
+    q is the quaternion and m the momentum in the principal frame at the start; mm is |m|², energy2 twice the energy.
     """
     if angle > PART_ANGLE_LIMIT * PARTS_LIMIT:
         return _turn_steadily(q, L, mm, energy2, h)
@@ -264,10 +264,11 @@ def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
 
 @kernel
 def _turn_far(q, m, L, J, series, mm, energy2, h):
-    """Quaternion after a time h in which the body may turn by more than `PART_ANGLE_LIMIT`.
+    """Quaternion after a free rotation over h [s], by an angle that may exceed `PART_ANGLE_LIMIT`.
 
-    The turn is made in parts; of many turns whole periods of the momentum m are made at once. mm is |m|², energy2 is
-    2E. The result is NaN if the angle overflows.
+    The rotation is made in parts; of many turns whole periods of the momentum m are made at once. q is the quaternion
+    and m the momentum in the principal frame at the start; mm is |m|², energy2 twice the energy. The result is NaN if
+    the angle overflows.
     """
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:

@@ -170,10 +170,10 @@ def parabola(x, v, a, h):
 
 @kernel
 def explicit_euler(y, load, inertia, h):
-    """Advance the state y by a step of explicit Euler: every rate is taken at the start of the step. Order 1.
+    """Advance the state y by a step h of explicit Euler: every rate is taken at the start of the step. Order 1.
 
-    Arguments and result: see the module. Under a held acceleration a,
-    x_n = x_0 + n h v_0 + n (n - 1) h² a / 2.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x_n = x_0 + n h v_0 + n (n - 1) h² a / 2.
     """
     x, q, v, L = y
     return (
@@ -186,12 +186,12 @@ def explicit_euler(y, load, inertia, h):
 
 @kernel
 def semi_implicit_euler(y, load, inertia, h):
-    """Advance the state y by a step of semi-implicit (symplectic) Euler. Order 1.
+    """Advance the state y by a step h of semi-implicit (symplectic) Euler. Order 1.
 
     Velocity and angular momentum are advanced first; position and attitude then move with the new ones.
 
-    Arguments and result: see the module. Under a held acceleration a,
-    x_n = x_0 + n h v_0 + n (n + 1) h² a / 2.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x_n = x_0 + n h v_0 + n (n + 1) h² a / 2.
     """
     x, q, v, L = y
     v_new = _along3(v, h, acceleration(load, inertia))
@@ -201,11 +201,12 @@ def semi_implicit_euler(y, load, inertia, h):
 
 @kernel
 def midpoint(y, load, inertia, h):
-    """Advance the state y by a step of the explicit midpoint rule. Order 2.
+    """Advance the state y by a step h of the explicit midpoint rule. Order 2.
 
     The rates of the whole step are those after half an Euler step.
 
-    Arguments and result: see the module. Under a held acceleration a, x is exact.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration x is exact.
     """
     x, q, v, L = y
     a = acceleration(load, inertia)
@@ -219,10 +220,10 @@ def midpoint(y, load, inertia, h):
 
 @kernel
 def rk4(y, load, inertia, h):
-    """Advance the state y by a step of the classical Runge-Kutta method ([2]_ of the module docstring). Order 4.
+    """Advance the state y by a step h of the classical Runge-Kutta method ([2]_ of the module docstring). Order 4.
 
-    Arguments and result: see the module. Under a held acceleration a, x is
-    exact: (v + 4 (v + h a/2) + (v + h a)) h / 6 = h v + h² a / 2.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x is exact: (v + 4 (v + h a/2) + (v + h a)) h / 6 = h v + h² a / 2.
     """
     x, q, v, L = y
     a = acceleration(load, inertia)
@@ -277,7 +278,8 @@ def matrix_rk4(y, load, inertia, h):
 def step(scheme, y, load, inertia, h):
     """Advance the state y by one step of the scheme with the code `scheme` (int).
 
-    Other arguments and result: see the module. An unknown code gives a state of NaN; callers check the code before.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`,
+    and h the step [s]. An unknown code gives a state of NaN; callers check the code before.
     """
     if scheme == EXPLICIT_EULER:
         return explicit_euler(y, load, inertia, h)

@@ -22,7 +22,7 @@ ANGULAR_DRAG_QUADRATIC = 1  # d [N m s²]
 
 @inlined
 def angular_drag(state, p, t):
-    """Force (zero) and torque about the centre of mass by drag on the rotation of a body in the `FieldState` state."""
+    """Force (zero) and torque by drag on the rotation of a body, from its `FieldState` and the parameters p."""
     w = state.w
     return ZERO, times(-(p[ANGULAR_DRAG_LINEAR] + p[ANGULAR_DRAG_QUADRATIC] * math.sqrt(qt.dot(w, w))), w)
 

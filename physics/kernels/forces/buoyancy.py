@@ -28,7 +28,7 @@ FLUID_WEIGHT = 4  # ρ g [N/m³]
 
 @inlined
 def _wet(state, p):
-    """Submerged part of a body: (volume [m³], centre, height, n).
+    """Submerged part of a body, from its `FieldState` and the parameters p: (volume [m³], centre, height, n).
 
     The centre of the submerged part is relative to the centre of mass, world frame [m]. The height is that of this
     centre above the fluid's surface [m], negative below it, and n is the surface's normal.
@@ -42,7 +42,7 @@ def _wet(state, p):
 
 @inlined
 def buoyancy(state, p, t):
-    """Force and torque about the centre of mass by buoyancy, for a body in the `FieldState` state."""
+    """Force and torque about the centre of mass by buoyancy, from a body's `FieldState` and the parameters p."""
     volume, arm, _, n = _wet(state, p)
     force = times(p[FLUID_WEIGHT] * volume, n)
     if state.shape == SPHERE and state.center == ZERO:

@@ -54,7 +54,7 @@ def swept_volume_rate(shape, dims, R, u):
 
 @inlined
 def drag(state, p, t):
-    """Force and torque about the centre of mass by drag, for a body in the `FieldState` state."""
+    """Force and torque about the centre of mass by drag, from a body's `FieldState` and the parameters p."""
     u = minus(velocity_at(state, state.center), state.air)
     k = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u) + p[DRAG_LINEAR]
     return acting_at(state.center, times(-k, u))

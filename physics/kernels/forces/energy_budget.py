@@ -33,7 +33,7 @@ WORK_ERROR_SHARE = UNRESOLVED_GAIN_SHARE = 0.01
 
 @inlined
 def potential_energy(y, later, offset_frame, body):
-    """Potential energy of all fields for a body in the state y, at the time `body.now` + `later` [s] [J]."""
+    """Potential energy [J] of all fields for a body in the state y, at the time `body.now` + `later` [s]."""
     x, q, v, L = y
     t = body.now + later
     return total_energy(field_state(x, q, v, L, t, offset_frame, body), t, body)

@@ -27,7 +27,7 @@ MAGNUS_STRENGTH = 0  # ½ ρ C [kg/m³]
 
 @inlined
 def magnus(state, p, t):
-    """Force and torque about the centre of mass by Magnus lift, for a body in the `FieldState` state."""
+    """Force and torque about the centre of mass by Magnus lift, from a body's `FieldState` and the parameters p."""
     d = state.dims
     u = minus(state.v, state.air)
     return times(p[MAGNUS_STRENGTH] * math.pi * d[0] * d[1] * d[2], qt.cross(state.w, u)), ZERO

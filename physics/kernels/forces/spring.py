@@ -42,7 +42,7 @@ PUSH_IS_BODY_FIXED = 6  # 1: along the body axes, 0: along the world's
 
 @inlined
 def spring_vector(state, p):
-    """Geometry (arm, e, l) of a spring in the world frame [m].
+    """Geometry (arm, e, l) of a spring in the world frame [m], from the body's `FieldState` and the parameters p.
 
     The arm goes from the centre of mass to the spring's point of the body, e from the anchor to that point; l = |e|.
     """
@@ -65,7 +65,7 @@ def spring_damper_load(arm, e, l, u, p):
 
 @inlined
 def spring(state, p, t):
-    """Force and torque about the centre of mass by a spring to a fixed anchor, for a body in the `FieldState` state."""
+    """Force and torque about the centre of mass by a spring to an anchor, from a `FieldState` and the parameters p."""
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
     arm, e, l = spring_vector(state, p)

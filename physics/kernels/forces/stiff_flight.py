@@ -57,9 +57,10 @@ def _as_it_is(end, y, h, flight, body):
 
 @if_declared(_as_it_is)
 def subdivide_stiff_flight(end, y, h, flight, body):
-    """State after a flight of h [s] from y: `end`, the result under held loads, or that of many parts if it is stiff.
+    """State after a flight of h [s] from y, which is cut into parts if its force fields are stiff.
 
-    The present time of the body is the same afterwards; the caller advances it.
+    Otherwise the state is `end`, the result of the flight under held loads. The present time of the body is the same
+    afterwards; the caller advances it.
     """
     if body.is_stiff == 0:
         return end

@@ -42,7 +42,10 @@ from physics.kernels.state.body import angular_velocity, read_state
 
 @inlined
 def linked_spring(state, p, t):
-    """Force and torque about the centre of mass by a spring to another body; zero if the body is not at its end."""
+    """Force and torque on a body by a spring to another body, from its `FieldState` and the parameters p.
+
+    Both are zero if the spring is not attached to the body.
+    """
     if p[LINK_OTHER] < 0.0 or (p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0):
         return ZERO, ZERO
     arm, e, l = spring_vector(state, p)

@@ -70,9 +70,10 @@ def note_stage_energy(offset_frame, bodies, first):
 
 @kernel
 def _gain_of(b, h, offset_frame, bodies):
-    """Gain of kinetic energy of body b in a stage of length h, less work done on it, and the sum of the sizes [J].
+    """Gain of kinetic energy of body b in a stage of length h, less work done on it [J], and a scale of its rounding.
 
-    Subtracted is the work of held loads, and of fields without a potential energy.
+    Subtracted is the work of held loads, and of fields without a potential energy. The scale is the sum of the sizes of
+    these energies [J].
     """
     body, y, end = bodies.body[b], _start(bodies.body[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))

@@ -125,7 +125,7 @@ def turning_acceleration_bound(spin, q, L, h, offset_frame, body):
 
 @inlined
 def turned_normal(n, m, t):
-    """Vector k = n + t m of the module docstring, with m = n x ω: the normal n seen from a body that turns."""
+    """Turn a wall's normal n as a body that turns at ω sees it: k = n + t m after the time t [s], with m = n x ω."""
     return (n[0] + t * m[0], n[1] + t * m[1], n[2] + t * m[2])
 
 
@@ -139,11 +139,11 @@ def support_of_vector(shape, dims, R, k):
 
 @inlined
 def bracket_safe_time(gap, rate, turning, bend, horizon):
-    """Times (before, after), at most `horizon` [s], between which the lower bound of a gap falls to zero.
+    """Times (before, after), at most `horizon` [s], between which the lower bound of a body's gap falls to zero.
 
-    The bound starts at `gap` [m], and its centre moves at `rate` [m/s] away from the wall. Turning adds between
-    -`turning` and `turning` [m/s] to the rate; the acceleration towards the wall is at most `bend` [m/s²]. `before`
-    takes the worst turning, `after` the best.
+    The bound is `gap` [m] now, and the body moves away from the wall at `rate` [m/s]. Turning changes this rate by
+    between -`turning` and `turning` [m/s]. The acceleration towards the wall is at most `bend` [m/s²]. `before` is the
+    zero with the worst turning, `after` the zero with the best.
     """
     s, u = max(0.0, turning - rate), max(0.0, turning + rate)
     before = 2.0 * gap / (s + math.sqrt(s * s + 2.0 * bend * gap))
@@ -168,10 +168,11 @@ def mean_time(low, high):
 
 @inlined
 def _height(t, n, m, gap, rate, bend, c, R, body):
-    """Lower bound of a body's gap to a wall after the time t of free flight [m], as in the module docstring.
+    """Lower bound of a body's gap to a wall after the time t of free flight [m].
 
-    n is the wall's normal, m = n x ω; gap and rate are those of the centre of mass, bend is the acceleration bound a. c
-    is the geometric centre relative to the centre of mass, R the body's rotation matrix.
+    n is the wall's normal and m = n x ω. `gap` and `rate` are the distance [m] and velocity [m/s] of the centre of mass
+    from the wall, and `bend` bounds the acceleration of the body's points towards it [m/s²]. c is the geometric centre
+    relative to the centre of mass, and R the body's rotation matrix.
     """
     k = turned_normal(n, m, t)
     dims = (body.dims[0], body.dims[1], body.dims[2])

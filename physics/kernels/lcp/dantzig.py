@@ -117,8 +117,9 @@ def find_rates(floats, index, n, count, i):
 
 @kernel
 def find_block(floats, index, z, n, i, largest, is_independent):
-    """Find the index that blocks the drive of i, because its z or w reaches zero first: (index, step of z_i).
+    """Find the index that blocks the drive of i, the growth of z_i until w_i = 0: (index, step of z_i).
 
+    It is the first index whose z or w reaches zero.
     The index is -1 if nothing blocks. If w_i also reaches zero there, within rounding, i itself is returned, which ends
     the drive. Otherwise i would depend on the clamped indices, and rounding would decide the next pivot.
     """

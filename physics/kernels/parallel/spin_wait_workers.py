@@ -65,7 +65,8 @@ def make_worker_table(members: int) -> np.ndarray:
 def wake_workers(crew, turns, members):
     """Wake the first `members` workers for a new batch, and reset the ranges of worlds in `turns`.
 
-    Returns the number of workers that were IDLE; the caller must start their threads.
+    `crew` is the table of `make_worker_table`. Returns the number of workers that were IDLE, not in their loop; the
+    caller must start their threads.
     """
     reset_ranges(turns)
     crew[0, CREW_FAILED_COUNT] = crew[0, CREW_LEADER_DONE] = away = 0
@@ -88,7 +89,7 @@ def stop_workers(crew):
 
 @inlined
 def _rest(crew, look):
-    """Pause a waiting thread after its poll number `look`; after some polls it also yields its processor."""
+    """Pause a waiting thread after its poll number `look`; after some polls it also yields its processor to others."""
     spin_pause()
     if look % crew[0, CREW_YIELD_INTERVAL] == 0 or (
         look == crew[0, CREW_BRIEF_PAUSES] and atomic_load(crew, 0, CREW_LEADER_DONE) == 0

@@ -76,7 +76,7 @@ def has_new_wrench(i, wrench, sleep):
 
 @inlined
 def _way_from_start(i, y, radius, rows):
-    """Upper bound of the distance of any point of body i, in the state y, from its place at the window's start [m].
+    """Upper bound of the displacement of any point of body i since the start of its window, in the state y [m].
 
     A turn by θ moves a point by at most 2 r sin(θ/2), with the bounding radius r. As |q - q0| = 2 sin(θ/4), this is at
     most 2 r |q - q0|. Norms are replaced by sums of absolute values, which are never smaller.
@@ -102,7 +102,7 @@ def _fastest_point(y, body):
 
 @inlined
 def _begin(i, y, rows):
-    """Start a window of body i: store the pose of the state y, and set the displacement to zero."""
+    """Start a window of time in which the displacement of body i is measured: store the pose of y, and set it to 0."""
     x, q, _, _ = y
     for c in range(3):
         rows[i, WINDOW_POSE + c] = x[c]
@@ -113,7 +113,7 @@ def _begin(i, y, rows):
 
 @inlined
 def _is_over(clock, body, sleep):
-    """True if a window that has lasted for `clock` [s] is over.
+    """True if a window of time, in which displacements are measured, is over after `clock` [s].
 
     Its length is `sleep.time`, or if that is 0 the time √(2 r/a) in which the body, with its acceleration a, falls its
     bounding radius r.
@@ -125,9 +125,10 @@ def _is_over(clock, body, sleep):
 
 @kernel
 def update_sleep_window(i, y, h, body, sleep):
-    """Update the window of body i after a substep of h [s] that ended in the state y.
+    """Update the window of time in which the displacement of body i is measured, after a substep of h [s] to y.
 
-    Returns True when a quiet window has just ended and the body has had `WINDOWS_BEFORE_SLEEP` of them in a row.
+    Returns True when a quiet window, with little displacement, has just ended, and the body has had
+    `WINDOWS_BEFORE_SLEEP` of them in a row.
     """
     rows = sleep.rows
     if rows[i, SLEEP_CLOCK] == 0.0:
@@ -151,7 +152,7 @@ def update_sleep_window(i, y, h, body, sleep):
 
 @inlined
 def is_motion_growing(last, before):
-    """True if the displacement `last` in a window is more than `_SLEEP_GROWTH` times that in the window before."""
+    """True if the displacement `last`, in the last window of time, is more than `_SLEEP_GROWTH` times that `before`."""
     return not last <= _SLEEP_GROWTH * before
 
 
@@ -163,7 +164,7 @@ def without_velocities(y):
 
 @inlined
 def remains_asleep(i, wrench, sleep):
-    """True if body i sleeps, and goes on to sleep because its wrench is the same; another wrench wakes it.
+    """True if body i sleeps and stays asleep, because its wrench is the same; a new wrench wakes it.
 
     For scenes whose bodies touch walls only; others have `multibody.data.sleeping`.
     """
@@ -174,10 +175,10 @@ def remains_asleep(i, wrench, sleep):
 
 @inlined
 def falls_asleep(i, y, h, body, sleep):
-    """Update the window of body i after a substep of h [s], and put the body to sleep if it is due.
+    """Put body i to sleep if it has moved little for two windows of time (`update_sleep_window`).
 
-    y is the state after the substep. Returns whether the body has fallen asleep. For scenes whose bodies touch walls
-    only; others have `multibody.data.sleeping`.
+    y is the state after a substep of h [s]. Returns whether the body has fallen asleep. For scenes whose bodies touch
+    walls only; others have `multibody.data.sleeping`.
     """
     if update_sleep_window(i, y, h, body, sleep) and not is_motion_growing(
         sleep.rows[i, LAST_DISPLACEMENT], sleep.rows[i, EARLIER_DISPLACEMENT]

@@ -37,7 +37,10 @@ _EASY_RULES = 5
 
 @kernel
 def _put_rate(t, offset_frame, linked):
-    """Write the rates of change of all bodies' states in `PLANE_HERE`, at the time t [s], into `PLANE_RATE`."""
+    """Compute the rates of change of all bodies' states, at the time t [s].
+
+    The states are in the plane PLANE_HERE of `linked.room`; the rates go to the plane PLANE_RATE.
+    """
     room, bodies = linked.room, linked.body
     for b in range(bodies.shape[0]):
         s = room[PLANE_HERE, b]
@@ -61,7 +64,7 @@ def _put_rate(t, offset_frame, linked):
 
 @inlined
 def _put_start(linked):
-    """Copy the states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
+    """Copy the states of the bodies, `linked.state`, into the planes PLANE_BEFORE and PLANE_HERE of `linked.room`."""
     for b in range(linked.state.shape[0]):
         x, q, v, L = read_state(linked.state, b)
         for plane in (PLANE_BEFORE, PLANE_HERE):
