@@ -111,13 +111,13 @@ class SlidingPair(NamedTuple):
 
 @inlined
 def swap_pair_problem(pair):
-    """Swap the two contacts of a `PairProblem`."""
+    """Return a `PairProblem` with its two contacts in the opposite order."""
     return PairProblem(pair.W22, transpose_block(pair.W12), pair.W11, pair.b2, pair.b1, pair.mu, pair.goal)
 
 
 @inlined
 def swap_pair_trial(trial):
-    """Swap the two contacts of a `PairTrial`."""
+    """Return a `PairTrial` with its two contacts in the opposite order."""
     return PairTrial(trial.found, trial.q, trial.p, trial.miss, trial.second, trial.first)
 
 

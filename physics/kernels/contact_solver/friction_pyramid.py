@@ -182,9 +182,10 @@ def fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q):
 
 @kernel
 def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
-    """Convert the unknowns z of the complementarity problem to impulses p [N s].
+    """Convert the unknowns z of the complementarity problem of n contacts, with friction pyramids, to impulses p [N s].
 
-    Impulses that rounding has put outside their friction cone are moved back into it.
+    `heading` has the direction d_0 of each pyramid, and `w_scale` is the factor of z in the scaled problem. Impulses
+    that rounding has put outside their friction cone are moved back into it.
     """
     for i in range(n):
         row = UNKNOWNS_PER_CONTACT * i

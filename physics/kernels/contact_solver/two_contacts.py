@@ -111,7 +111,10 @@ def _solve_with_sticking(pair, direction):
 
 @inlined
 def _solve_both_sliding(pair, first, second):
-    """Solve the normal impulses of two contacts with given friction -μ d per normal impulse: their `SlidingPair`."""
+    """Solve a `PairProblem` for the normal impulses of two contacts that slide in given directions: a `SlidingPair`.
+
+    `first` and `second` are their frictions -μ d per normal impulse, with the directions d of sliding.
+    """
     W11, W12, W22, b1, b2, mu, _ = pair
     (x1, y1), (x2, y2) = first, second
     a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
@@ -136,9 +139,10 @@ def _solve_both_sliding(pair, first, second):
 
 @inlined
 def _direction_newton_step(pair, first, second, sliding):
-    """Newton's step of both sliding directions: two angles [rad], from the `SlidingPair` of the present directions.
+    """Newton step of both sliding directions: two angles [rad], from the `SlidingPair` of the present directions.
 
-    Turning direction 1 by dα changes its friction `first` = (x1, y1) by (-y1, x1) dα.
+    `first` = (x1, y1) and `second` are the frictions -μ d per normal impulse of the two contacts of the `PairProblem`.
+    Turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα.
     """
     W11, W12, W22, _, _, _, _ = pair
     p1, p2, _, _, inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
@@ -195,7 +199,7 @@ def _solve_alternately(pair, trial):
 
 @inlined
 def _turn_directions(pair, trial, sliding):
-    """Return `trial` with both sliding directions turned by Newton's step."""
+    """Return the `PairTrial` `trial` with both sliding directions turned by a Newton step."""
     (x1, y1), (x2, y2) = trial.first, trial.second
     turn1, turn2 = _direction_newton_step(pair, trial.first, trial.second, sliding)
     first, second = rotate_direction(x1, y1, turn1), rotate_direction(x2, y2, turn2)
@@ -204,7 +208,10 @@ def _turn_directions(pair, trial, sliding):
 
 @inlined
 def _try_sliding(sliding, first, second, goal):
-    """Make the `PairTrial` of two sliding contacts; it is found if both push, and their residuals are within `goal`."""
+    """Make the `PairTrial` of a `SlidingPair`; it is found if both contacts push, with residuals within `goal` [m/s].
+
+    `first` and `second` are their frictions -μ d per normal impulse, with the directions d of sliding.
+    """
     p1, p2, (x1, y1), (x2, y2) = sliding.p1, sliding.p2, first, second
     worst = max(sliding.miss1, sliding.miss2)
     found = p1 >= 0.0 and p2 >= 0.0 and worst <= goal

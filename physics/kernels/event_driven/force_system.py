@@ -20,7 +20,7 @@ _DOUBTFUL_PIVOT = 1.0e-7
 
 @kernel
 def _set_metric(m, P, body, unknowns):
-    """Fill `unknowns.matrix` with the products of the m rows in the kinetic metric, and the right-hand side with 0.
+    """Fill `unknowns.matrix` with products of the m constraint rows in the kinetic metric; the right-hand side is 0.
 
     P is the rotation matrix of the principal axes.
     """
@@ -36,7 +36,7 @@ def _set_metric(m, P, body, unknowns):
 
 @kernel
 def _choose_rows(m, P, body, unknowns):
-    """Choose linearly independent rows among the m rows; return their number.
+    """Choose linearly independent rows among the m constraint rows; return their number.
 
     Their indices come first in `unknowns.independent_row`. The matrix of products of rows is positive semidefinite, so
     its largest entry is on the diagonal, and the columns of the pivots are indices of rows, too.

@@ -199,8 +199,8 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
     """Integrate the smooth motion of the contact mode from y for `left` [s], or until a guard ends it.
 
     Returns (state, time [s], GUARD_ code); the code is GUARD_NONE if no guard ended the motion. If the force guards of
-    the mode are distrusted, only one step is made, at most `watched_length` long. It ends with GUARD_WATCH if no other
-    guard ends it.
+    the mode are ignored (`mode_acceptance`), only one step is made, at most `watched_length` long. It ends with
+    GUARD_WATCH if no other guard ends it.
     """
     body = scratch.body
     smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds

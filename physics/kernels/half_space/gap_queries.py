@@ -21,7 +21,7 @@ def principal_matrix(state, params, i):
 
 @entry_kernel
 def write_angular_momenta(rows, state, params):
-    """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
+    """Write angular momenta L = R I Rᵀ ω [kg m²/s] into the given rows of `state`, from their angular velocities ω."""
     for k in range(rows.shape[0]):
         i = rows[k]
         w = (state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2])
