@@ -284,7 +284,7 @@ def _open_pulling(current, pulling, pushing):
 
 @inlined
 def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, scratch):
-    """Make one round of Newton's method on the directions; if one would reverse, solve by `primal_dual_friction`.
+    """Make one round of Newton's method on sliding directions; if one would reverse, solve by `primal_dual_friction`.
 
     If `is_mixed`, some contacts stuck in the last stage, and `primal_dual_friction` starts at once.
 

@@ -28,9 +28,9 @@ _EVENTS_BETWEEN_LEAPS = 6
 
 @inlined
 def reset_chatter_control(unit, pace):
-    """Reset look-ahead, leaps and distrusted modes at the start of a substep; `unit` is the body's time scale [s].
+    """Reset look-ahead and leaps at the start of a substep, and trust the force guards of all contact modes again.
 
-    `pace` is the group `Motion.pace`.
+    `unit` is the time scale of the body [s], `pace` the group `Motion.pace`.
     """
     pace.look_ahead = pace.min_look_ahead = _LOOK_AHEAD * unit
     pace.next_leap = _FIRST_LEAP * pace.min_look_ahead
@@ -62,8 +62,8 @@ def adapt_look_ahead(step, guard, motion):
     """Adapt the look-ahead after a motion of `step` [s] that `guard` has ended.
 
     If a force guard has ended it, and the motion was shorter than the look-ahead or its contact mode the same as
-    before, the look-ahead grows; at its largest value the guards of the mode are distrusted. After a longer motion it
-    is reset.
+    before, the look-ahead grows; at its largest value the force guards of the mode are ignored from then on. After a
+    longer motion the look-ahead is reset.
     """
     pace, contacts = motion.pace, motion.contacts
     if guard in FORCE_GUARDS and (step < pace.look_ahead or contact_mode_hash(contacts) == pace.ended_mode):

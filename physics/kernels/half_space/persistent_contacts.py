@@ -92,9 +92,9 @@ def cancel_separation(y, h, offset_frame, memory, scratch):
     not be back at the wall within h [s].
 
     Such a contact got a push in the last stage that was too large by u/w, with u its speed and w its mobility. A
-    smaller push of the next stage usually makes up for it. Where the next stage cannot, because no push pulls, this
-    excess is taken back now. At most all of the last push is taken, so that the sum of both stays positive.
-    `contacts.rebound` gets the impulse that was taken, as a negative number [N s].
+    smaller push of the next stage usually makes up for it. Where that push would have to pull, this excess is taken
+    back now. At most all of the last push is taken, so that the sum of both stays positive. `contacts.rebound` gets the
+    impulse that was taken, as a negative number [N s].
     """
     body, contacts = scratch.body, scratch.contacts
     x, q, v, L = y
