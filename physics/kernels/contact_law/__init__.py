@@ -1,1 +1,1 @@
-"""Laws at a contact: target velocities, friction, restitution, compliance."""
+"""Contact laws: target velocities of the contact problem, friction with two coefficients, restitution, compliance."""

@@ -1,21 +1,21 @@
-"""Friction with two coefficients along a wall: Coulomb's circle in stretched tangents.
+"""Friction with two coefficients μ1, μ2 along the tangents of a wall: isotropic friction in stretched tangents.
 
-The tangential forces that a surface with coefficients μ1, μ2 along its tangents can exert fill an ellipse, and of these
-it exerts the one that dissipates most:
+The tangential forces f that such a wall can exert on a contact, with the normal force f_n, fill an ellipse. Of these
+forces it exerts the one that dissipates most at the tangential velocity u:
 
     (f1/μ1)² + (f2/μ2)² <= f_n²,      f·u least:      f = -(μ1² u1, μ2² u2) f_n / sqrt(μ1² u1² + μ2² u2²).
 
-With k = μ2/μ1, S = diag(1, k), f = S g and u' = S u the power is g·u', and the ellipse the circle |g| <= μ1 f_n. So g
-and u' obey the isotropic law with the one coefficient μ1, and a contact problem with the rows S J of the tangents is an
-isotropic one: W' = S W S, b' = S b, p = S p'.
+Let k = μ2/μ1, S = diag(1, k), f = S g and u' = S u. Then the power is g·u', and the ellipse is the circle
+|g| <= μ1 f_n. So g and u' obey the isotropic law with the coefficient μ1. A contact problem u = W p + b whose Jacobian
+J has the tangent rows S J is an isotropic one: W' = S W S, b' = S b, p = S p'.
 
-A body whose tangent velocities are stretched moves like a rigid one again. By (S a) x (S b) = cof(S) (a x b), now with
-S = diag(1, 1, k) in the frame (normal, tangents) of a wall, u' = v' + ω' x r' with
+The direct solvers (`sliding_patch`) have no rows. They use velocity v, angular velocity ω, arm r = (c, a, b) and
+inverse inertia K in the frame (normal, tangents) of the wall. A body whose tangent velocities are stretched is again a
+rigid body: with S = diag(1, 1, k) and (S a) x (S b) = cof(S) (a x b), u' = v' + ω' x r' for
 
-    v' = S v,    ω' = S⁻¹ ω,    r' = cof(S) r = (k c, k a, b),    K' = S⁻¹ K S⁻¹,    M'⁻¹ = S M⁻¹ S,
+    v' = S v,    ω' = S⁻¹ ω,    r' = cof(S) r = (k c, k a, b),    K' = S⁻¹ K S⁻¹,    M'⁻¹ = S M⁻¹ S.
 
-so that the direct solves (`sliding_patch`) take these for u, ω, r, K; the inverse mass along tangent 2 alone differs,
-by k².
+So the direct solvers take these numbers instead. Only the inverse mass along tangent 2 differs, by the factor k².
 
 References
 ----------
@@ -31,13 +31,17 @@ from physics.compiler.decorators import inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, if_law, law_parameter
 
-# k = μ2/μ1 of the body in the workspace; the literal 1 where it is not declared, which the compiler multiplies out.
+# Kernel (body) that returns k = μ2/μ1; it is the literal 1 where the law is not declared, which the compiler drops.
 friction_ratio = law_parameter(LAW_ANISOTROPY, 1.0)
 
 
 @inlined
 def stretched_frame(K, u, w, k):
-    """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity in the stretched frame of a wall."""
+    """Stretch the motion of a body along tangent 2 of a wall by the factor k: return stretched (K, u, w).
+
+    K is the inverse inertia (00, 01, 02, 11, 12, 22), u the velocity and w the angular velocity, all in the frame
+    (normal, tangent 1, tangent 2) of the wall.
+    """
     s = 1.0 / k
     return (
         (K[0], K[1], s * K[2], K[3], s * K[4], s * (s * K[5])),
@@ -52,7 +56,7 @@ def _as_assembled(n, scratch):
 
 @if_law((LAW_ANISOTROPY,), _as_assembled)
 def stretch_tangents(n, scratch):
-    """Stretch the rows of tangent 2 in the contact problem assembled in `scratch`, and its impulses with them."""
+    """Stretch tangent 2 of all n contacts in the contact problem assembled in `scratch.contacts`, with its impulses."""
     contacts = scratch.contacts
     k = friction_ratio(scratch.body)
     for i in range(n):
@@ -70,7 +74,7 @@ def stretch_tangents(n, scratch):
 
 @if_law((LAW_ANISOTROPY,), _as_assembled)
 def unstretch_tangents(n, scratch):
-    """The impulses along the unit tangents again."""
+    """Convert the impulses of n contacts in `scratch.contacts` from stretched tangents back to unit tangents."""
     k = friction_ratio(scratch.body)
     for i in range(n):
         scratch.contacts.impulse[3 * i + 2] *= k
@@ -82,7 +86,10 @@ def _as_it_is(vector, axes, body):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def unstretch_force(f, axes, body):
-    """S⁻¹ f of a force f, whose size along the wall is then compared with μ1 times the push; `axes` are the wall's."""
+    """Divide the component of a contact force f along tangent 2 by μ2/μ1, so that friction is isotropic, with μ1.
+
+    `axes` are normal and tangents of the wall; f and the result are in the world frame.
+    """
     k = friction_ratio(body)
     s = (1.0 / k - 1.0) * qt.dot(axes[2], f)
     return f[0] + s * axes[2][0], f[1] + s * axes[2][1], f[2] + s * axes[2][2]
@@ -90,7 +97,11 @@ def unstretch_force(f, axes, body):
 
 @if_law((LAW_ANISOTROPY,), _as_it_is)
 def sliding_direction(d, axes, body):
-    """Vector S² d/|S d| for sliding along the unit vector d: friction is -μ1 f_n times it; d on an even wall."""
+    """Vector e that gives the friction force -μ1 f_n e of a contact that slides along the unit vector d.
+
+    e = S² d/|S d|, where S multiplies the component along tangent 2 by μ2/μ1. `axes` are normal and tangents of the
+    wall; d and e are in the world frame. If both coefficients are equal, e = d.
+    """
     k = friction_ratio(body)
     a, b = qt.dot(axes[1], d), k * qt.dot(axes[2], d)
     size = math.sqrt(a * a + b * b)

@@ -1,28 +1,29 @@
-"""Contact that gives: springs and dampers between contact points and walls, implicit, stable at any stiffness.
+"""Compliant contact: springs and dampers between contact points and walls, by the θ-method, stable at any stiffness.
 
-A point with the gap g pushes with f = -k g - c g', and never pulls: 0 <= f ⟂ f + k g + c g' >= 0. A stage of length h
-drifts (1 - θ) h with the old velocities and θ h with the new ones, and its impulse is that of gap and rate weighted in
-the same way:
+A contact point with the gap g pushes with the force f = -k g - c g', and never pulls: 0 <= f ⟂ f + k g + c g' >= 0.
+Here k is the stiffness, c the damping, and g' the rate of the gap. A stage of length h drifts (1 - θ) h with the old
+velocities and θ h with the new ones. Its impulse p weights the values at the start (0) and at the end (1) in the same
+way:
 
     p = -h (k g_θ + c g'_θ),    g_θ = (1 - θ) g⁰ + θ g¹,    g'_θ likewise.
 
-(Of a point that is still above the wall, g⁰ > 0, 0 stands for g⁰ there: the spring then stores at most the energy
-that was paid for.) With g, the gap after the first drift, g¹ = g + θh u + (θh)² b/2 and g'¹ = u + θh b, u the new
-velocity of the point where it is then and b what it gains there per time by turning
-(`target_velocity.set_resting_targets`), that is linear in u. In a contact problem
+If the point begins above the wall, g⁰ > 0, then g⁰ counts as 0: so the spring stores at most the energy that the motion
+has paid for. Let g be the gap after the first drift, u the new normal velocity of the point there, and b the normal
+acceleration that turning gives to it (`target_velocity.set_resting_targets`). Then g¹ = g + θh u + (θh)² b/2 and
+g'¹ = u + θh b, which are linear in u. So the contact problem has the normal rows
 
     0 <= p ⟂ u + γ p - t >= 0,    γ = 1/(h D),    D = θ (θhk + c),
     t = -[k (θ (g + (θh)² b/2) + (1 - θ) g⁰) + c (θ²h b + (1 - θ) g'⁰)]/D,
 
-a number γ more on the diagonal of W, and a target. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the sag is exact.
-A point that ends up deeper than g¹, since turning is no parabola, is lifted there (`correct_spring_depth`): by moving
-the body, as in `half_space.contact_set.project_out_of_walls`. A depth that no force has worked for would be energy for
-a stiff spring.
+with the compliance γ added to the diagonal of W, and the target t. In equilibrium g = g⁰ = -p/(hk) at any h and θ: the
+sag is exact. Turning is no parabola, so a point may end deeper than g¹, which is its *due depth*. The body is then
+moved, so that the point has its due depth (`correct_spring_depth`). A depth for which no force has done work would be
+energy from nothing in a stiff spring.
 
-This is the θ-method. θ = ½ is the midpoint rule: of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 =
--k (g¹² - g⁰²)/2. θ = 1 is implicit Euler, which brings what a step cannot resolve to rest in one step. For ½ <= θ <= 1
-no energy is gained. With λ the fastest rate of the contacts, √(k w) or c w, w = Σ W_nn of them all (no less than the
-largest eigenvalue),
+θ = ½ is the midpoint rule: it is of second order, and a spring keeps its energy, p (u⁰ + u¹)/2 = -k (g¹² - g⁰²)/2.
+θ = 1 is implicit Euler, which brings motion that a step does not resolve to rest in one step. For ½ <= θ <= 1 no energy
+is gained. Let λ be the fastest rate of the contacts, the larger of √(k w) and c w, with w = Σ W_nn over all contacts,
+which is at least the largest eigenvalue. The stage has
 
     θ = max(½, 1 - 1/(λh)):
 
@@ -55,7 +56,7 @@ from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, apply_inv_inertia, kinetic_energy, principal_attitude
 from physics.kernels.state.contact_law_dispatch import LAW_DAMPING, LAW_STIFFNESS, if_law, law_parameter
 
-# Share of its energy that a body may gain in a resting stage by what is of third order in the step.
+# Share of its energy that a body may gain in a resting stage, by errors of third order in the step.
 ENERGY_GAIN_TOLERANCE = 2.0e-5
 
 contact_stiffness = law_parameter(LAW_STIFFNESS)
@@ -73,7 +74,10 @@ def _halves(n, y, h, offset_frame, scratch):
 
 @if_law((LAW_STIFFNESS,), _halves)
 def split_stage_by_theta(n, y, h, offset_frame, scratch):
-    """Lengths (1 - θ) h and θ h of the drifts before and after the impulses [s]."""
+    """Lengths (1 - θ) h and θ h [s] of the drifts before and after the impulses of a stage of length h from y.
+
+    n is the number of contacts. In scenes without compliant contact both are h/2.
+    """
     body = scratch.body
     q = y[1]
     place_arms(n, qt.to_matrix(q), offset_frame, scratch)
@@ -96,10 +100,11 @@ def _no_aim(*arguments):
 
 @if_law((LAW_STIFFNESS,), _no_aim)
 def set_spring_targets(n, x, motion, before, after, offset_frame, scratch):
-    """Targets along the normals, and the γ of the stage, instead of `target_velocity.set_resting_targets`.
+    """Set the normal targets of n compliant contacts and the compliance γ of the stage, after `set_resting_targets`.
 
-    x and `motion` (`StageMotion`) are those of the body between the drifts of `before` and `after`, before the
-    impulses; `contacts.gap` is that at the start.
+    The stage has two drifts, `before` and `after` [s] long. x and `motion` (`StageMotion`) are position and motion of
+    the body between them, before the impulses. `contacts.gap` has the gaps at the start. Written are `contacts.target`,
+    `contacts.end_gap` (the gaps at the end, so far without the new velocities) and `body.give`, γ [1/kg].
     """
     scene, body, contacts = scratch.scene, scratch.body, scratch.contacts
     R, v, w, alpha = motion
@@ -129,7 +134,10 @@ def set_spring_targets(n, x, motion, before, after, offset_frame, scratch):
 
 @if_law((LAW_STIFFNESS,), _no_aim)
 def predict_end_gaps(n, v, w, after, scratch):
-    """Gaps at the end of the stage into `contacts.end_gap`, from the velocities after the impulses."""
+    """Complete the gaps at the end of the stage, `contacts.end_gap` [m], by the motion of the last drift.
+
+    `after` is the length of that drift [s], v and w are velocity and angular velocity after the impulses.
+    """
     contacts = scratch.contacts
     for i in range(n):
         normal = wall_normal(scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene))
@@ -142,7 +150,11 @@ def _as_it_ends(n, y, end, h, offset_frame, report, scratch):
 
 @inlined
 def _lifted(n, x, R, share, offset_frame, scratch):
-    """Position x moved out of the walls until no point is deeper than `share` of its spring's due depth."""
+    """Move the position x out of walls until no contact point is deeper than `share` of its due depth; return it.
+
+    A due depth is that which the contact problem has foretold, a negative gap in `contacts.end_gap`. R is the body's
+    rotation matrix.
+    """
     contacts = scratch.contacts
     least = NEGLIGIBLE_SLOP_SHARE * scratch.body.slop
     for i in range(n):
@@ -154,7 +166,7 @@ def _lifted(n, x, R, share, offset_frame, scratch):
 
 @inlined
 def _work_of_loads(y, end, h, offset_frame, body):
-    """Work of the held loads from y to `end`, and loss of kinetic energy [J]."""
+    """Work of the held loads on a body over h from y to `end`, plus its loss of kinetic energy [J]."""
     a, T, v, L = body.free_acceleration, body.torque, end[2], end[3]
     d = end[0][0] - y[0][0], end[0][1] - y[0][1], end[0][2] - y[0][2]
     lost = kinetic_energy(y[1], y[2], y[3], body, offset_frame) - kinetic_energy(end[1], v, L, body, offset_frame)
@@ -167,7 +179,7 @@ def _work_of_loads(y, end, h, offset_frame, body):
 
 @inlined
 def _stored(n, x, R, offset_frame, scratch):
-    """Energy of the springs at x [J]."""
+    """Energy in the springs of n contacts, for a body at the position x with the rotation matrix R [J]."""
     stored = 0.0
     for i in range(n):
         gap = min(feature_gap(scratch.contacts.slot[i], x, R, offset_frame, scratch), 0.0)
@@ -177,9 +189,10 @@ def _stored(n, x, R, offset_frame, scratch):
 
 @inlined
 def _without_excess(y, end, excess, h, offset_frame, report, scratch):
-    """State `end` without the created energy `excess` [J], if that exceeds the errors of the stage and its solve.
+    """State after a stage from y to `end`, with the energy `excess` [J], which it has created, taken from the motion.
 
-    Where there is too little motion to pay with the body stays at y without velocity, and is reported as coarse.
+    An excess within the errors of the stage and of its solve is left. If the kinetic energy is smaller than the excess,
+    the body stays at the pose of y without velocity, and is reported as unresolved motion.
     """
     body = scratch.body
     x, q, v, L = end
@@ -197,12 +210,14 @@ def _without_excess(y, end, excess, h, offset_frame, report, scratch):
 
 @if_law((LAW_STIFFNESS,), _as_it_ends)
 def correct_spring_depth(n, y, end, h, offset_frame, report, scratch):
-    """End of a stage from y with no point deeper than its spring's due depth, and no other point in a wall.
+    """Correct the end of a compliant stage of length h from y to `end`: lift contact points that are too deep.
 
-    The springs store at most the sum of the energy before, of the loss of motion and of the work of the loads. (Damping
-    stops a point at the turning rate of the stage's start, and leaves a point deeper whose body turns more slowly
-    later.) Friction far beyond 1 may push a turning point by more than its spring takes; this energy is taken from the
-    motion.
+    A point is too deep below its due depth, which the contact problem has foretold (`contacts.end_gap`). Returns the
+    corrected end. Contact points outside the set are moved out of walls. The springs then store at most the
+    sum of their energy before, of the loss of kinetic energy, and of the work of loads; the body is lifted further
+    where they store more. (Damping stops a point at the turning rate of the stage's start. It leaves the point too deep
+    if the impulses have slowed the turning.) Friction coefficients far above 1 may push a turning point by more than
+    its spring takes; this energy is taken from the motion.
     """
     body = scratch.body
     x, q, v, L = end
@@ -231,7 +246,7 @@ def _as_it_is(block, body):
 
 @if_law((LAW_STIFFNESS,), _as_it_is)
 def add_block_compliance(W, body):
-    """Block of a contact with itself, and γ."""
+    """Add the compliance γ to the normal entry of W, a contact's own Delassus block, nine scalars row by row."""
     return W[0] + body.give, W[1], W[2], W[3], W[4], W[5], W[6], W[7], W[8]
 
 
@@ -241,7 +256,7 @@ def _as_assembled(n, width, scratch):
 
 @if_law((LAW_STIFFNESS,), _as_assembled)
 def add_delassus_compliance(n, width, scratch):
-    """Add γ to the assembled W."""
+    """Add the compliance γ to the normal diagonal entries of the Delassus matrix, with `width` rows per contact."""
     for i in range(n):
         scratch.contacts.delassus[width * i, width * i] += scratch.body.give
 
@@ -252,8 +267,9 @@ def _unyielding(value, rho, body):
 
 @if_law((LAW_STIFFNESS,), _unyielding)
 def scale_by_compliance(value, rho, body):
-    """Normal impulse p of a wall with the compliance γ, from `value` = q - ρ u without it; or the slope of p.
+    """Divide `value` by 1 + ρ γ, with ρ = `rho` and the compliance γ of contact; without compliance it stays the same.
 
-    It solves p = q - ρ (u + γ p): p = (q - ρ u)/(1 + ρ γ).
+    `value` = q - ρ u is the normal impulse of a proximal step at a rigid wall. At a compliant wall
+    p = q - ρ (u + γ p) gives p = (q - ρ u)/(1 + ρ γ). The slope of the impulse has the same factor.
     """
     return value / (1.0 + rho * body.give)

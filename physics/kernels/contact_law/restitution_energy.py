@@ -1,13 +1,14 @@
 """Limit the rebound of an impact, or the impulses of a stage, so that they create no energy.
 
-Newton's restitution is a law of normal velocities before and after; where friction turns the slip round meanwhile, it
-can ask for more than the body has (Kane's paradox). A plastic impact never does: with u⁺ = u⁻ + W p, p·u⁺ <= 0,
+Newton's law of restitution relates normal velocities before (u⁻) and after (u⁺) an impact. Where friction turns the
+slip round during the impact, the law may require more energy than the body has (Kane's paradox). A plastic impact never
+gains energy: with the impulses p, u⁺ = u⁻ + W p and p·u⁺ <= 0,
 
     ΔE = ½ p·(u⁻ + u⁺) = ½ (2 p·u⁺ - p·W p) <= 0.
 
-The momenta between it (s = 0) and the full rebound (s = 1) are those of impulses in the same cones, which are convex,
-and leave no contact approaching. The energy is a parabola in s. The kernel takes the largest s at which it equals the
-energy before.
+Momenta between those of the plastic impact (s = 0) and those of the full rebound (s = 1) come from impulses in the same
+friction cones, since cones are convex, and no contact approaches after them. The energy is a parabola in s. This module
+takes the largest s at which the energy is at most that before the impact.
 
 References
 ----------
@@ -23,16 +24,19 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import lerp
 from physics.kernels.state.body import apply_inv_inertia, kinetic_energy
 
-# Share of the energy by which rounding of an impact may raise it: of the dozen products and sums behind a momentum.
+# Share by which rounding may raise the energy in an impact; a momentum results from about a dozen products and sums.
 IMPACT_ENERGY_ROUNDING = 1.0e-14
 
-# Slops that a body is lifted out of a wall for nothing.
+# Lifts of a body out of a wall by at most this many slops do not cost kinetic energy.
 _FREE_LIFT_SLOPS = 10.0
 
 
 @inlined
 def lift_conserving_energy(z, y, offset_frame, body):
-    """State y moved to the place z out of a wall. The work of the lift against the loads is taken from the motion."""
+    """State y with its position moved to z, out of a wall; the work against the loads is taken from the motion.
+
+    Displacements of a few slops cost nothing.
+    """
     x, q, v, L = y
     d, a = (z[0] - x[0], z[1] - x[1], z[2] - x[2]), body.free_acceleration
     lift = -body.mass * (a[0] * d[0] + a[1] * d[1] + a[2] * d[2])
@@ -45,10 +49,11 @@ def lift_conserving_energy(z, y, offset_frame, body):
 
 @inlined
 def rebound_share(before, plastic, full, middle):
-    """Largest s in [0, 1] at which the energy is at most `before`.
+    """Largest share s of an impact's rebound, in [0, 1], at which the energy after it is at most `before` [J].
 
-    `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]: f(s) = plastic + B s + C s² with
-    C = 2 (full + plastic) - 4 middle >= 0 and f(1) > before >= f(0). The root in the form that does not cancel.
+    `plastic`, `middle` and `full` are the energies at s = 0, 1/2 and 1 [J]. The energy is the parabola
+    f(s) = plastic + B s + C s² with C = 2 (full + plastic) - 4 middle >= 0, and f(1) > before >= f(0). Its root is
+    computed by the formula without cancellation.
     """
     c = min(plastic - before, 0.0)
     C = max(2.0 * (full + plastic) - 4.0 * middle, 0.0)
@@ -61,9 +66,10 @@ def rebound_share(before, plastic, full, middle):
 
 @inlined
 def limit_rebound_energy(q, before, plastic, full, body, offset_frame):
-    """Motion (v, L) with the largest share s of the full rebound that creates no energy, and s.
+    """Limit an impact to the largest share s of its rebound that creates no energy: (v, L, s).
 
-    `before` is the energy before the impact [J], which the full rebound would raise.
+    `plastic` and `full` are (v, L) after the impact without and with its full rebound. `before` is the energy before
+    the impact [J], which the full rebound would raise. q is the attitude of the body.
     """
     (v0, L0), (v1, L1) = plastic, full
     middle = kinetic_energy(q, lerp(v0, v1, 0.5), lerp(L0, L1, 0.5), body, offset_frame)
@@ -74,11 +80,15 @@ def limit_rebound_energy(q, before, plastic, full, body, offset_frame):
 
 @kernel
 def scale_impulses_to_dissipate(n, friction, before, w, solved, free, R, scratch):
-    """Result of `solve_contacts` for `free` (v, L), with impulses shortened until they create no energy.
+    """Shorten the impulses of a contact problem that no method has solved, so that they create no energy.
 
-    For a problem that no method solved. Its impulses lie in their cones, and so does any share s of them, whose work is
-    ½ s (A + s B), A = P·(v + v_free) + Q·(ω + ω_free), B = P·P/m + Q·I⁻¹ Q >= 0, with v and ω (`before`, `w`) before
-    the stage. That is none at s = -A/B if A < 0, and less for any shorter.
+    `solved` is the result of `solve_contacts` for `free`, the (v, L) of the body without impulses; it is returned with
+    new velocities, and `contacts.impulse` is shortened. `before` and `w` are velocity and angular velocity before the
+    stage or the impact.
+
+    The impulses lie in their friction cones, and so does any share s of them. Let P be their sum and Q their moment.
+    Their work is ½ s (A + s B), with A = P·(v + v_free) + Q·(ω + ω_free) and B = P·P/m + Q·I⁻¹ Q >= 0. If A < 0, the
+    work is zero at s = -A/B and negative for smaller s.
     """
     body = scratch.body
     v, L = free

@@ -1,4 +1,7 @@
-"""Target velocities of the contacts of a set: at an impact, and at the end of a resting stage."""
+"""Set the target velocities of the contacts in the contact set: of an impact, or of the end of a resting stage.
+
+A target is the contact velocity (normal, tangents) that a solve aims at: 0 for rest, -e u_n for a rebound.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,18 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.simd_gather import broadcast, gather_column_from, gather_numbers_from, scatter_columns
 from physics.kernels.state.layout import BLOCK, SPHERE
 
-# Share of a resting contact's gap that a step closes. In the linear iteration of gap and velocity over steps,
-# λ² - (1 - β/2) λ + β/2 = 0, the root is double (fastest approach without overshoot) for β = 6 - 4√2.
+# Share β of a resting contact's gap that a step closes. Gap and velocity change from step to step by a linear map with
+# eigenvalues λ² - (1 - β/2) λ + β/2 = 0. They are equal, for the fastest approach without overshoot, at β = 6 - 4√2.
 GAP_CLOSING_SHARE = 0.3431457505076198
 
-# Turn in a stage beyond which accelerations at its middle say nothing about its end any more [rad].
+# Turn in a stage beyond which accelerations at its middle no longer tell the velocities at its end [rad].
 MAX_TARGET_TURN = 0.5
 
-# Share of the slop below which the displacement of a contact in one step does not count.
+# A contact's displacement in one step below this share of the slop is neglected.
 NEGLIGIBLE_SLOP_SHARE = 1.0e-3
 
-# Of the contacts of a set: none is fast enough for an impact, some are left so by the last stage, some hit their wall.
+# Results of `set_impact_targets`: no contact approaches fast enough for an impact; only persistent contacts do, by an
+# error of the last stage; some contact hits its wall.
 NO_IMPACT, RESIDUAL_APPROACH, TRUE_IMPACT = range(3)
 
 
@@ -36,32 +40,37 @@ class StageMotion(NamedTuple):
 
 
 class TargetLimits(NamedTuple):
-    """Terms of the targets of a resting stage that all contacts share."""
+    """Numbers in the targets of a resting stage that are the same for all contacts."""
 
     half: float  # half the length of the stage [s]
-    is_turning: bool  # whether what turning adds counts
+    is_turning: bool  # True if the velocity that contacts gain by turning is taken into account
     negligible: float  # smaller targets are 0 [m/s]
-    rate: float  # share of a gap that may be closed, per time [1/s]
+    rate: float  # share of a gap that the stage may close, over the length of the stage [1/s]
 
 
 @inlined
 def may_have_impact(bounce_speed, slop_speed, scratch):
-    """True if a contact of the set is fast enough for an impact; else no impact is looked for."""
+    """True if a contact of the set approaches fast enough for an impact, so that `set_impact_targets` is needed.
+
+    The limit is `slop_speed` [m/s], or `bounce_speed` if that is smaller and the body has a restitution.
+    """
     return scratch.contacts.approach > (min(bounce_speed, slop_speed) if scratch.body.restitution > 0.0 else slop_speed)
 
 
 @inlined
 def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, scratch):
-    """Set the targets of an impact; return its kind: nothing, contacts to bring to rest, or an impact.
+    """Set the target velocities of n contacts for an impact; return NO_IMPACT, RESIDUAL_APPROACH or TRUE_IMPACT.
 
-    A contact that approaches faster than `bounce_speed` leaves with e times that speed (Newton's law); one that
-    approaches slower is brought to rest, since its rebound would be over within the step, and if it also is slower
-    than `slop_speed` plus its gap by h it closes less than the slop within the step and is left to
-    the resting stage. One that leaves may be turned round, to e times its speed: with that, and only with that, no
-    frictionless impact of several contacts gains energy (Moreau; theory, section 8).
+    The targets, `contacts.target`, depend on the normal speed of each contact:
 
-    A contact that continues from the last stage has hit nothing (`persistent_contacts`). It is brought to rest, and its
-    speed set to zero, without an impact.
+    - A contact that approaches faster than `bounce_speed` [m/s] rebounds with e times its speed (Newton's law).
+    - A contact that approaches more slowly is brought to rest, since its rebound would be over within the step. It only
+      makes an impact if it is also faster than `slop_speed` [m/s] plus its gap over h; else the resting stage stops it.
+    - A contact that leaves may be turned round, to approach with e times its speed. Only with this rule does no
+      frictionless impact of several contacts gain energy (Moreau; theory, section 8).
+
+    A persistent contact, which continues from the last stage (`persistent_contacts`), has hit nothing. It is brought to
+    rest, and its speed is set to zero. h is the time left of the substep [s], and y the state.
     """
     contacts = scratch.contacts
     found, rate = NO_IMPACT, 1.0 / h
@@ -85,7 +94,7 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, 
 
 @inlined
 def is_above_wall(i, n, scratch):
-    """True if a contact of the wall of contact i is still above it."""
+    """True if any of the n contacts at the wall of contact i has a gap of more than a slop."""
     contacts = scratch.contacts
     if not contacts.widest > scratch.body.slop:
         return False
@@ -98,13 +107,14 @@ def is_above_wall(i, n, scratch):
 
 @inlined
 def clamp_target_to_energy(target, u):
-    """Limit a target (normal, tangents) for a contact of the velocity u to at most a reversal of u.
+    """Limit a target velocity (normal, tangents) so that a contact with the velocity u gains no energy.
 
-    Impulses p that change contact velocities from u to u' change the energy by p·(u + u')/2: a push with u' <= -u adds
-    nothing, nor does what holds at |u'| <= |u|. Where a body turns by much less than a radian in a stage the target
-    is just -u. Where it turns by more, ω x ṙ says nothing about the end of the stage, and is as large as one likes.
-    Along the wall a target t longer than u is shortened to |u|²/|t| <= |u|: the same where they are nearly equal, and
-    one division.
+    All six components are `Lanes`, one lane for each of up to four contacts. An impulse p that changes the contact
+    velocity from u to u' changes the energy by p·(u + u')/2. So a push needs u'_n <= -u_n, and friction that holds
+    needs |u'_t| <= |u_t|. Targets of a body that turns by much less than a radian in a stage are within these limits.
+    Where it turns by more, targets from accelerations in the middle of the stage may have any size. Along the wall a
+    target t longer than u_t is shortened to |u_t|²/|t| <= |u_t|, which needs a single division and is the same where
+    the lengths are nearly equal.
     """
     most, square = u[1] * u[1] + u[2] * u[2], target[1] * target[1] + target[2] * target[2]
     share = select_lanes(square > most, most / square, 1.0)
@@ -113,7 +123,7 @@ def clamp_target_to_energy(target, u):
 
 @inlined
 def _in_frame(k, a, walls):
-    """Vector in the frame of wall k: normal, tangents."""
+    """Components of the world vector a along normal and tangents of wall k."""
     return (
         a[0] * walls[k, 0] + a[1] * walls[k, 1] + a[2] * walls[k, 2],
         a[0] * walls[k, 3] + a[1] * walls[k, 4] + a[2] * walls[k, 5],
@@ -123,7 +133,10 @@ def _in_frame(k, a, walls):
 
 @kernel
 def _wandering(k, R, w, offset_frame, scratch):
-    """`contact_arm_and_rate` of a body without vertices at wall k, apart from the code of blocks."""
+    """Arm of the contact point of a sphere or an ellipsoid at wall k, and its rate (`contact_arm_and_rate`).
+
+    R is the body's rotation matrix, w its angular velocity. A separate kernel, so that it does not burden blocks.
+    """
     body = scratch.body
     dims = (body.dims[0], body.dims[1], body.dims[2])
     return contact_arm_and_rate(body.shape, dims, R, w, wall_normal(scratch.scene.walls, k), 0, offset_frame, body)
@@ -131,7 +144,11 @@ def _wandering(k, R, w, offset_frame, scratch):
 
 @inlined
 def _wandering_point(k, R, w, alpha, offset_frame, scratch):
-    """Return ω x r, ω x ṙ and α x r of a body without vertices at wall k, four times each."""
+    """Vectors ω x r, ω x ṙ and α x r of the contact point of a sphere or an ellipsoid at wall k.
+
+    r is the arm, w the angular velocity ω and alpha the angular acceleration α. Each component is `Lanes` of four equal
+    numbers.
+    """
     r, rate = _wandering(k, R, w, offset_frame, scratch)
     turn, a, b = qt.cross(w, r), qt.cross(w, rate), qt.cross(alpha, r)
     return (
@@ -143,7 +160,10 @@ def _wandering_point(k, R, w, alpha, offset_frame, scratch):
 
 @inlined
 def _aim_at_wall(first, n, motion, limits, offset_frame, scratch):
-    """Do `set_resting_targets` for contacts from `first` on, up to four of one wall; return the next contact."""
+    """Set the targets of a resting stage for up to four contacts of one wall, from number `first` on.
+
+    Returns the number of the next contact. See `set_resting_targets`.
+    """
     scene, contacts = scratch.scene, scratch.contacts
     walls, arm = scene.walls, contacts.arm
     R, v, w, alpha = motion
@@ -175,21 +195,27 @@ def _aim_at_wall(first, n, motion, limits, offset_frame, scratch):
 
 @kernel
 def _aim_at_others(first, n, motion, limits, offset_frame, scratch):
-    """Do `set_resting_targets` for contacts from `first` on; seldom called, since most bodies touch one wall."""
+    """Set the targets of a resting stage for all contacts from number `first` on (`set_resting_targets`).
+
+    It is seldom called, since most bodies touch one wall with at most four contacts.
+    """
     while first < n:
         first = _aim_at_wall(first, n, motion, limits, offset_frame, scratch)
 
 
 @inlined
 def set_resting_targets(n, motion, h, offset_frame, scratch):
-    """Set the targets of a resting stage over h, from the motion at its middle before the impulses (`StageMotion`).
+    """Set the target velocities of n contacts, `contacts.target`, for a resting stage of length h [s].
 
-    The impulses act at the middle of the step, the target is the velocity at its end, half a step later: by then a
-    point has gained h/2 (ω x ṙ + α x r), α the angular acceleration of free turning, and that is taken off. Of a vertex
-    ṙ = ω x r; the lowest point of an ellipsoid wanders over it; of a sphere it is 0. A feature still above the wall may
-    close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage). A target smaller than the tolerance of
-    the solve, or one that would move a contact by less than `NEGLIGIBLE_SLOP_SHARE` slops in the step, is 0: a body
-    comes to rest to the last bit, and contacts that hold are not asked to move apart by next to nothing.
+    `motion` is the `StageMotion` of the body at the middle of the stage, before the impulses. The contacts are to have
+    zero velocity at the end of the stage, but the impulses act in its middle. In between a contact point gains
+    h/2 (ω x ṙ + α x r), with the angular acceleration α of free turning. So the target in the middle is minus this
+    gain. For a vertex ṙ = ω x r; the lowest point of an ellipsoid wanders over it; for a sphere the gain is 0. A body
+    that turns by more than `MAX_TARGET_TURN` has no such term.
+
+    A feature still above the wall may close `GAP_CLOSING_SHARE` of its gap (all of it in a substep's last stage).
+    Targets smaller than the tolerance of the solve are 0, and so are targets that would move a contact by less than
+    `NEGLIGIBLE_SLOP_SHARE` slops in the stage. So a body comes to rest to the last bit.
     """
     body = scratch.body
     w = motion.w

@@ -1,4 +1,4 @@
-"""Solvers of the contact problem of one body, from closed forms to Newton's method, and the contract they share.
+"""Solvers of the contact problem of one body at walls: the problem, and what all solvers read, write and return.
 
 The problem
 -----------
@@ -8,13 +8,13 @@ impulses, less the targets,
 
     u = W p + b,    0 <= p_n ⟂ u_n >= 0,    |p_t| <= μ p_n,    u_t = 0 or p_t = -μ p_n u_t/|u_t|.
 
-Walls with two coefficients of friction come as a stretched problem of this form (`contact_law.anisotropic_friction`),
-walls that give as a larger diagonal of W (`contact_law.compliance`). Without friction only the normal rows remain.
+Friction with two coefficients becomes a stretched problem of this form (`contact_law.anisotropic_friction`). Compliant
+walls have a larger diagonal of W (`contact_law.compliance`). Without friction only the normal rows remain.
 
-Given
+Input
 -----
 n : int
-    Contacts, one at least.
+    Number of contacts, one at least.
 R : tuple of 9 floats
     Principal frame to world.
 v, L : tuples of 3 floats
@@ -23,30 +23,30 @@ scratch : record
     Workspace of the body (`time_stepping.workspace`). Solvers read of its groups
 
     - `contacts`: `slot`, `arm`, `target` of each contact;
-    - `contacts.impulse`, the warm start: 3 n numbers with friction, n without; zeros where nothing is known;
+    - `contacts.impulse`, the warm start: 3 n numbers with friction, n without; zeros if there is none;
     - `scene.walls`; of `body` its `mass`, `J`, `radius`, `mu` and the members of its laws;
-    - `stage.mode`, the direct solve to try first, which did it last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`,
-      `TRY_MIXED`);
+    - `stage.mode`, the direct method to try first, because it solved the last problem (`sliding_patch.TRY_STICKING`,
+      `TRY_SLIDING`, `TRY_MIXED`);
     - `settings.tolerance` of the relative residual; `stage.residual_limit`, a tolerance of iterative solves [m/s];
-      `stage.target_error_limit`, the misfit of targets that contacts that hold may have [m/s];
-    - `settings.sweeps`, how many sweeps are made at most.
+      `stage.target_error_limit`, the allowed error of the targets of sticking contacts [m/s];
+    - `settings.sweeps`, the largest number of sweeps.
 
-Left behind
------------
+Output
+------
 scratch.contacts.impulse
     The solution, along the unit tangents of each wall.
 scratch.stage.mode
-    The direct solve that did it. `single_wall` leaves it as it was for one contact, and for two that are left of a
-    face; so do iterative solves and pivoting.
+    The direct method that solved the problem. It is not changed by `single_wall` for one contact, and for two contacts
+    that are left of a face, nor by iterative solves and pivoting.
 v, L, residual, sweeps, method
     Returned by `solve.solve_contacts`: motion with the impulses, relative residual, sweeps and Newton steps made, and
     `METHOD_DIRECT`, `METHOD_SWEEPS` or `METHOD_PIVOTING` (`state.layout`), the last method tried.
 
-The group `solver`, and all else that a solver writes, is memory of its own.
+Solvers also write to the group `solver` and to other members of `scratch`; no other kernel reads these.
 
 Residual
 --------
-The natural map of the problem, in units of velocity. It is 0 at solutions and nowhere else:
+The residual is the natural map of the problem, in units of velocity. It is 0 at solutions and nowhere else:
 
     max over i of   |p_n - max(0, p_n - ρ u_n)|/ρ   and   |p_t - disk(p_t - ρ_t u_t, μ p_n)|/ρ_t,
 
@@ -56,54 +56,54 @@ the solver:
 
 - Sweeps, Newton's method and pivoting measure it on the impulses that they leave (`gauss_seidel.cone_residual`,
   `gauss_seidel.normal_residual`).
-- `single_wall` reports a bound of its tangential part, with W_aa + W_bb instead of λ_max(W_tt). Contacts that push have
-  their normal target, and open ones do not close, to within the tolerance; of a face that is not in the residual.
+- `single_wall` reports a bound of the tangential part, with W_aa + W_bb instead of λ_max(W_tt). Pushing contacts meet
+  their normal targets, and open ones do not close, to within the tolerance; for a face the residual leaves this out.
 - `sticking` reports the largest distance of a velocity from its target, or the fastest approach of an open contact,
-  over the largest free speed along the axes of the world. It reports 0 where that is rounding, or at most
+  divided by the largest free speed along the axes of the world. It reports 0 if that is rounding, or at most
   `target_error_limit`.
 
 Failure
 -------
-No solver raises. Each says so in its own way, and `solve_contacts` goes on to the next one:
+No solver raises an exception. A solver that fails tells so as follows, and `solve_contacts` goes on to the next one:
 
 - A direct solver returns `found` False, and has changed neither `contacts.impulse` nor `stage.mode`.
-- Sweeps and Newton's method return a residual above their tolerance, and leave the impulses they came to. Newton's
-  method leaves the best it met, so its residual is at most that of its start.
+- Sweeps and Newton's method return a residual above their tolerance. Sweeps leave their last impulses, Newton's method
+  leaves the best of its impulses, so that its residual is at most that of its start.
 - The LCP solvers return a status other than `LCP_SOLVED`, and leave the impulses as they were.
 - `solve_contacts` returns a residual above `settings.tolerance`. Callers count that as unconverged
   (`state.body.report_solve`).
 
-Comparisons are written `not residual <= tolerance`, so that a residual that is no number counts as failure. Velocities
-that are not finite have an infinite residual.
+Comparisons are written `not residual <= tolerance`, so that a residual of NaN counts as failure. Velocities that are
+not finite have an infinite residual.
 
 Solvers
 -------
-In the order in which `solve_contacts` tries them; the first result within its tolerance is taken.
+`solve_contacts` tries the solvers in this order, and takes the first result within its tolerance.
 
 1. Direct, without W, to the tolerance `settings.tolerance` max |b|. They return (found, v, L, relative residual).
 
-   a. `sticking.solve_all_sticking`: all contacts take their targets, or open. Any number of contacts and walls, with
-      friction, walls that do not give. It comes before b where it is likelier: for three or four contacts of one wall
-      if friction may stop them (`patch_start.may_stick`), for two, or several walls, if `stage.mode` is
-      `TRY_STICKING`. Otherwise it comes after b, for a single contact always.
-   b. `single_wall.solve_single_wall`: contacts hold, slide or open. One to four contacts of one wall; at most two where
-      walls give. It tries `two_contacts.solve_one_contact` for one, `two_contacts.solve_two_contacts` for two, and
-      `sliding_patch.solve_sliding_patch` for three or four; the latter once more, patiently, if a contact opened and
-      nothing was found. That one in turn calls
+   a. `sticking.solve_all_sticking`: all contacts meet their targets, or open. It solves any number of contacts and
+      walls, with friction, without compliance. It comes before b where it is more likely to succeed: for three or four
+      contacts of one wall if friction may stop them (`patch_start.may_stick`), for two contacts, or several walls, if
+      `stage.mode` is `TRY_STICKING`. Otherwise it comes after b, for a single contact always.
+   b. `single_wall.solve_single_wall`: contacts stick, slide or open. It solves one to four contacts of one wall; at
+      most two if walls are compliant. It calls `two_contacts.solve_one_contact` for one contact,
+      `two_contacts.solve_two_contacts` for two, and `sliding_patch.solve_sliding_patch` for three or four. The latter
+      is called once more, with `patient`, if it has opened a contact and found nothing. It calls in turn
 
-      - `primal_dual_friction.solve_stick_slip_patch`, where a direction of sliding would turn right round, and first
-        if `stage.mode` is `TRY_MIXED` and the warm start is of the present loads;
+      - `primal_dual_friction.solve_stick_slip_patch`, where a direction of sliding would reverse, and at first if
+        `stage.mode` is `TRY_MIXED` and the warm start belongs to the present loads;
       - `two_contacts.solve_two_contacts`, once two contacts are left.
 
-2. Iterative, on the assembled `contacts.delassus` and `contacts.bias`, from `contacts.impulse` on. The tolerance is the
-   smaller of `settings.tolerance` max |b| and `stage.residual_limit`, but not below rounding. They return (sweeps or
-   steps, residual [m/s]), and leave u in `contacts.velocity`.
+2. Iterative, on the assembled `contacts.delassus` and `contacts.bias`, starting from `contacts.impulse`. The tolerance
+   is the smaller of `settings.tolerance` max |b| and `stage.residual_limit`, but not below rounding. They return
+   (sweeps or steps, residual [m/s]), and leave u in `contacts.velocity`.
 
-   a. Without friction `gauss_seidel.normal_sweeps`; where walls give, after a few pivots of Dantzig's method.
-   b. With friction `gauss_seidel.cone_sweeps`, a dozen, in turn with `proximal_newton.proximal_newton`; where walls
-      give, Newton's method comes first. This goes on until `settings.sweeps` sweeps are made.
+   a. Without friction `gauss_seidel.normal_sweeps`; if walls are compliant, after a few pivots of Dantzig's method.
+   b. With friction a dozen sweeps by `gauss_seidel.cone_sweeps`, in turn with `proximal_newton.proximal_newton`; if
+      walls are compliant, Newton's method comes first. This goes on until `settings.sweeps` sweeps are made.
 
-3. Pivoting, if the plan has it and the residual is above both the tolerance and 1 % of max |b|. With friction that is
+3. Pivoting, if the plan has it and the residual is above both the tolerance and 1 % of max |b|. With friction this is
    `friction_pyramid.solve_pyramid_lcp` (Lemke's method), without it `friction_pyramid.solve_normal_lcp` (Dantzig's).
    They return (status, pivots). Their result is kept if it has the smaller residual.
 """

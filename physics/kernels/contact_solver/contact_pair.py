@@ -1,4 +1,4 @@
-"""Data of one or two contacts of one wall, for `two_contacts`."""
+"""Data of one or two contacts of one wall that `two_contacts` works with: contacts, their problem, and trials of it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from physics.kernels.math import quaternion as qt
 
 
 class WallContact(NamedTuple):
-    """A contact in the stretched frame (normal, tangents) of its wall.
+    """One contact in the stretched frame (normal, tangents) of its wall (`anisotropic_friction`).
 
     Attributes
     ----------
@@ -20,7 +20,7 @@ class WallContact(NamedTuple):
     approach : tuple of 3 floats
         Velocity without contact impulses, less the target [m/s].
     impulse : tuple of 3 floats
-        Warm start [N s]; 0 without friction.
+        Impulse of the warm start [N s]; 0 without friction.
     """
 
     place: tuple
@@ -58,13 +58,13 @@ class PairTrial(NamedTuple):
     Attributes
     ----------
     found : bool
-        Whether they solve the problem.
+        True if the impulses solve the problem.
     p, q : tuple of 3 floats
         Impulses of the first and of the second contact [N s].
     miss : float
         Residual [m/s].
     first, second : tuple of 2 floats
-        Friction -μ d per normal impulse, d the direction of sliding, of each contact.
+        Friction -μ d per normal impulse of each contact, with its direction d of sliding.
     """
 
     found: bool
@@ -76,7 +76,7 @@ class PairTrial(NamedTuple):
 
 
 class SlidingPair(NamedTuple):
-    """Two contacts that slide in given directions, their normal velocities on target.
+    """Two contacts that slide in given directions, with normal impulses by which normal velocities meet their targets.
 
     Attributes
     ----------
@@ -85,13 +85,13 @@ class SlidingPair(NamedTuple):
     miss1, miss2 : float
         Residuals [m/s]; infinite where a contact moves backwards.
     inverse : tuple of 4 floats
-        Matrix (a_11, a_12, a_21, a_22) of the normal impulses over its determinant [kg].
+        Matrix (a_11, a_12, a_21, a_22) of normal velocities per normal impulse, divided by its determinant [kg].
     g11, g12, g21, g22 : tuple of 2 floats
-        g_ij: tangential velocity of contact i per normal impulse of j, friction along with it [1/kg].
+        g_ij: tangential velocity of contact i per normal impulse of contact j and its friction [1/kg].
     along1, along2 : float
-        μ times the velocities along the directions [m/s].
+        Velocities along the directions, times μ [m/s].
     across1, across2 : float
-        μ times those across [m/s].
+        Velocities across the directions, times μ [m/s].
     """
 
     p1: float
@@ -111,19 +111,19 @@ class SlidingPair(NamedTuple):
 
 @inlined
 def swap_pair_problem(pair):
-    """The same problem with the contacts in the other order."""
+    """Return a `PairProblem` with its two contacts in the opposite order."""
     return PairProblem(pair.W22, transpose_block(pair.W12), pair.W11, pair.b2, pair.b1, pair.mu, pair.goal)
 
 
 @inlined
 def swap_pair_trial(trial):
-    """A trial of the `swap_pair_problem` as one of the problem."""
+    """Return a `PairTrial` with its two contacts in the opposite order."""
     return PairTrial(trial.found, trial.q, trial.p, trial.miss, trial.second, trial.first)
 
 
 @inlined
 def contact_in_wall_frame(i, body, scratch):
-    """The `WallContact` of contact i of a `FreeBody`, with its impulse so far. Without friction there is none."""
+    """Make the `WallContact` of contact i of a `FreeBody`, with its warm start from `contacts.impulse`."""
     contacts = scratch.contacts
     axes, u, w = body.axes, body.u, body.w
     arm, ratio = (contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2]), friction_ratio(scratch.body)

@@ -1,4 +1,4 @@
-"""Contact with friction as one linear complementarity problem: the pivoting fallback.
+"""Solve the contact problem by pivoting, as a linear complementarity problem, with or without friction.
 
 n contacts with impulses p = (normal, tangent 1, tangent 2) each [N s] and
 velocities u = W p + b [m/s]. Coulomb's cone |p_t| <= mu p_n is replaced by the
@@ -11,12 +11,14 @@ speed lambda as the last unknown the conditions of each contact are
     0 <= lambda  perpendicular to  mu p_n - sum beta_k >= 0.
 
 The matrix is copositive, and Lemke's method finds a solution whenever contacts
-are not wedged (without friction the problem has one).
+are not wedged. Contacts are wedged if they can push against each other without
+moving the body.
 
 An inscribed pyramid never gives more friction than the cone, and at least
 cos(pi/8) = 0.924 of it against the sliding velocity. It is turned so that d_0
-is opposite the sliding velocity of the start p, so that sliding that way is
-exact: a call that returns its own start has solved the problem of the cone.
+is opposite to the sliding velocity at the initial impulses p, so that friction
+against this velocity is exact: a call that returns its initial impulses has
+solved the problem with the cone.
 
 References
 ----------
@@ -48,8 +50,8 @@ from physics.kernels.lcp.scaling_and_certificate import (
 
 DIRECTIONS = 8
 UNKNOWNS_PER_CONTACT = DIRECTIONS + 2  # per contact: p_n, beta_0 .. beta_7, lambda
-SLIDING_TOLERANCE = 2.0**-30  # of the velocities that add up to u_t: slower than this is rounding
-RETRY_ANGLE = 1.0  # [rad], no fraction of a turn: no two pyramids come to stand alike
+SLIDING_TOLERANCE = 2.0**-30  # share of the terms that add up to u_t; a smaller u_t is rounding
+RETRY_ANGLE = 1.0  # turn of a pyramid at the second try [rad]; no fraction of a full turn, so all turns differ
 
 _R = math.sqrt(0.5)
 COSINE = (1.0, _R, 0.0, -_R, -1.0, -_R, 0.0, _R)
@@ -57,18 +59,21 @@ SINE = (0.0, _R, 1.0, _R, 0.0, -_R, -1.0, -_R)
 
 
 class PyramidProblem(NamedTuple):
-    """The complementarity problem of n contacts and room to solve it: views of one array, m = 10 n unknowns.
+    """Linear complementarity problem of n contacts with friction, of m = 10 n unknowns, and memory to solve it.
+
+    All members are views of one array.
 
     Attributes
     ----------
     M : (m, m) float64
-        Matrix: w_scale W between normals and directions, and the rows of the cones.
+        Matrix: the Delassus matrix W between normals and directions, times w_scale, a power of two, and the rows of
+        the cones (module docstring).
     q : (m,) float64
-        Right side [m/s].
+        Right-hand side [m/s].
     z : (m,) float64
         Unknowns p_n, beta_0 .. beta_7, lambda of each contact; w_scale times p_n and beta are impulses [N s].
     tableau : (m + 3, m + 2) float64
-        Of Lemke's method.
+        Tableau of Lemke's method.
     heading : (n, 2) float64
         Direction d_0 of each contact.
     """
@@ -81,9 +86,9 @@ class PyramidProblem(NamedTuple):
 
 
 def pyramid_sizes(n_max: int) -> tuple[int, int]:
-    """Lengths of `floats` (float64) and `index` (int64) for up to n_max contacts: 200 n_max² numbers.
+    """Lengths of the arrays `floats` (float64) and `index` (int64) of `solve_pyramid_lcp` for up to n_max contacts.
 
-    About 1 MB for 24 contacts: one workspace per thread, not one per world.
+    They have about 200 n_max² numbers, 1 MB for 24 contacts. So each thread has them once, not each world.
     """
     size = UNKNOWNS_PER_CONTACT * n_max
     (rows, columns), integers = lemke_sizes(size)
@@ -98,7 +103,10 @@ def normal_lcp_sizes(n_max: int) -> tuple[int, int]:
 
 @kernel
 def orient_pyramids(W, b, n, p, heading):
-    """Direction d_0 of each contact into `heading` (n, 2): against u_t; if that vanishes, along p_t."""
+    """Write the direction d_0 of each contact's pyramid into `heading` (n, 2), from the impulses p.
+
+    It is opposite to the tangential velocity u_t = (W p + b)_t. If u_t vanishes, it is along the tangential impulse.
+    """
     for i in range(n):
         ux, uy = b[3 * i + 1], b[3 * i + 2]
         magnitude = abs(ux) + abs(uy)
@@ -120,7 +128,7 @@ def orient_pyramids(W, b, n, p, heading):
 
 @kernel
 def rotate_pyramids(n, heading):
-    """Turn each contact's pyramid by its own multiple of `RETRY_ANGLE`."""
+    """Turn the pyramid of contact i, its direction d_0 in `heading`, by (i + 1) `RETRY_ANGLE`, for a second try."""
     for i in range(n):
         c, s = math.cos((i + 1) * RETRY_ANGLE), math.sin((i + 1) * RETRY_ANGLE)
         x, y = heading[i, 0], heading[i, 1]
@@ -129,14 +137,14 @@ def rotate_pyramids(n, heading):
 
 @kernel
 def pyramid_direction(heading, i, k):
-    """d_k of contact i: d_0 turned by k pi / 4."""
+    """Direction d_k of the pyramid of contact i: d_0, in `heading`, turned by k pi / 4."""
     x, y = heading[i, 0], heading[i, 1]
     return COSINE[k] * x - SINE[k] * y, SINE[k] * x + COSINE[k] * y
 
 
 @kernel
 def fill_pyramid_block(W, w_scale, heading, i, j, M):
-    """Block of contacts i, j of the complementarity problem: W between normals and directions."""
+    """Fill the block of the contacts i and j in the matrix M: w_scale W between normals and pyramid directions."""
     row, column = UNKNOWNS_PER_CONTACT * i, UNKNOWNS_PER_CONTACT * j
     for c in range(DIRECTIONS + 1):
         if c == 0:
@@ -155,7 +163,7 @@ def fill_pyramid_block(W, w_scale, heading, i, j, M):
 
 @kernel
 def fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q):
-    """The complementarity problem of all contacts, with W times `w_scale`."""
+    """Fill matrix M and right-hand side q of the complementarity problem of n contacts, with W times `w_scale`."""
     M[:] = 0.0
     for i in range(n):
         row = UNKNOWNS_PER_CONTACT * i
@@ -174,7 +182,11 @@ def fill_pyramid_lcp(W, b, mu, n, w_scale, heading, M, q):
 
 @kernel
 def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
-    """Store the impulses of the multipliers, moved back into the cone where rounding put them outside."""
+    """Convert the unknowns z of the complementarity problem of n contacts, with friction pyramids, to impulses p [N s].
+
+    `heading` has the direction d_0 of each pyramid, and `w_scale` is the factor of z in the scaled problem. Impulses
+    that rounding has put outside their friction cone are moved back into it.
+    """
     for i in range(n):
         row = UNKNOWNS_PER_CONTACT * i
         x, y = 0.0, 0.0
@@ -192,7 +204,7 @@ def store_pyramid_impulses(z, mu, n, w_scale, heading, p):
 
 @inlined
 def _pyramid_problem(n, floats):
-    """Make the `PyramidProblem` in `floats`, whose contents are not set."""
+    """Make a `PyramidProblem` of n contacts of views of the array `floats`; its numbers are not set."""
     size = UNKNOWNS_PER_CONTACT * n
     rows, columns = size + 3, size + 2
     end_M = size * size
@@ -222,25 +234,25 @@ def solve_pyramid_lcp(W, b, mu, n, p, floats, index, max_pivots):
     n : int
         Number of contacts.
     p : (3 n or more,) float64, in and out
-        [N s]. In: where to turn the pyramids from; zeros if nothing is known. Out:
+        [N s]. In: initial impulses, from which the pyramids are turned, or zeros. Out:
         the solution if the status is `LCP_SOLVED`, else unchanged.
     floats, index : float64, int64, scratch
-        Of the lengths that `pyramid_sizes` gives, or longer.
+        Scratch arrays of the lengths that `pyramid_sizes` gives, or longer.
     max_pivots : int
-        About 10 n are usual.
+        Largest number of pivots; about 10 n are usual.
 
     Returns
     -------
     status : int
         0 solved, 1 ray (wedged), 2 pivot limit, 3 data not finite or mu negative, 4 inaccurate.
     pivots : int
-        Exchanges done.
+        Pivots made.
 
     Notes
     -----
-    Redundant contacts seen from near a solution make paths so degenerate that, once in about
-    10⁵ problems, rounding loses one: a path without a result is followed once more with every
-    pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
+    Redundant contacts can make the path of Lemke's method so degenerate that, once in about
+    10⁵ problems, rounding leads it to a wrong end. So a try without a result is repeated once
+    with every pyramid turned. Multiplying W, or b, by a power of two gives exactly the scaled p.
     """
     M, q, z, tableau, heading = _pyramid_problem(n, floats)
     largest = 0.0
@@ -279,14 +291,14 @@ def solve_normal_lcp(W, b, n, p, floats, index, max_pivots):
     p : (n or more,) float64, out
         [N s]. The solution if the status is `LCP_SOLVED`, else unchanged.
     floats, index : float64, int64, scratch
-        Of the lengths that `normal_lcp_sizes` gives, or longer.
+        Scratch arrays of the lengths that `normal_lcp_sizes` gives, or longer.
     max_pivots : int
-        About 2 n are usual.
+        Largest number of pivots; about 2 n are usual.
 
     Returns
     -------
     status, pivots : int
-        As `physics.kernels.lcp.dantzig.dantzig`.
+        Those of `physics.kernels.lcp.dantzig.dantzig`.
     """
     size = (2 * n + 6) * n
     z = floats[size : size + n]

@@ -8,10 +8,11 @@ Its natural-map residual, per contact and in units of velocity, is
 
     max( |p_n - max(0, p_n - ρ u_n)| / ρ,   |p_t - disk(p_t - ρ_t u_t, μ p_n)| / ρ_t )
 
-with ρ = 1/W_nn and ρ_t = 1/λ_max(W_tt); it vanishes exactly at a solution. u is kept current, so the residual
-is measured, not estimated, before every sweep: a warm start that still solves the problem costs no sweep.
+with ρ = 1/W_nn and ρ_t = 1/λ_max(W_tt); `disk` projects onto a disk about 0 of the radius μ p_n. It vanishes exactly
+at a solution. The velocities u are kept up to date, so the residual is measured, not estimated, before every sweep: a
+warm start that still solves the problem needs no sweep.
 
-One contact is treated as the one-contact problem of its block: release, hold (3x3 solve) or slide.
+A sweep visits each contact once, and solves it alone by its 3x3 block of W: it opens, sticks (3x3 solve) or slides.
 
 References
 ----------
@@ -31,20 +32,21 @@ from physics.kernels.half_space.contact_point import wall_of
 LOCAL_TANGENT_RHO = 9
 LOCAL_NORMAL_RHO = 10
 
-# Newton steps of one contact's sliding direction per visit at most, and the last turn worth another [rad].
+# Largest number of Newton steps on a contact's sliding direction in a visit; turns below the tolerance end them [rad].
 _ANGLE_NEWTON_STEPS = 3
 _ANGLE_TOLERANCE = 1.0e-3
 
-# Sweeps between two extrapolations. A slow sweep contracts along one direction with a ratio q near 1, which
-# two changes of p tell; the rest of that geometric series, q/(1 - q) times the last change, is then added at
-# once.
+# Sweeps between two extrapolations. Slow sweeps contract along one direction with a ratio q near 1, which follows from
+# the last two changes of p. The rest of this geometric series, q/(1 - q) times the last change, is added at once.
 EXTRAPOLATION_PERIOD = 4
 _MAX_CONTRACTION_RATIO = 0.998
 
 
 @kernel
 def assemble_delassus(n, width, R, v, w, scratch):
-    """Jacobian rows, W = J M⁻¹ Jᵀ and b = J (v, ω) - target for the n contacts in `scratch`.
+    """Assemble the contact problem of the n contacts in `scratch.contacts`: J, W = J M⁻¹ Jᵀ, b = J (v, ω) - target.
+
+    Written are the Jacobian rows `frame` and `angular`, `response` (I⁻¹ times the angular rows), `delassus` and `bias`.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ def assemble_delassus(n, width, R, v, w, scratch):
 
 @kernel
 def invert_contact_blocks(n, scratch):
-    """Inverse of each contact's 3x3 block, and the steps ρ, ρ_t of the residual."""
+    """Write the inverse of each contact's 3x3 block of W, and its ρ and ρ_t (module docstring), into `solver.local`."""
     W, local = scratch.contacts.delassus, scratch.solver.local
     for i in range(n):
         r = 3 * i
@@ -113,7 +115,7 @@ def invert_contact_blocks(n, scratch):
 
 @kernel
 def update_contact_velocities(rows, W, p, b, u):
-    """Update u = W p + b in the first `rows` rows."""
+    """Compute the contact velocities u = W p + b [m/s] in the first `rows` rows; u is overwritten."""
     for r in range(rows):
         total = b[r]
         for s in range(rows):
@@ -123,7 +125,10 @@ def update_contact_velocities(rows, W, p, b, u):
 
 @kernel
 def cone_residual(n, p, u, mu, local):
-    """Largest natural-map residual over the contacts [m/s] (see the module docstring); infinite if u is NaN."""
+    """Largest natural-map residual (module docstring) of n contacts with friction [m/s]; infinite if u is not finite.
+
+    p and u are impulses and velocities, mu the friction coefficients; `local` is that of `invert_contact_blocks`.
+    """
     worst = check = 0.0
     for i in range(n):
         r = 3 * i
@@ -142,7 +147,7 @@ def cone_residual(n, p, u, mu, local):
 
 @kernel
 def normal_residual(n, p, u, W):
-    """`cone_residual` of frictionless contacts, one row each [m/s]."""
+    """Largest natural-map residual of n contacts without friction, one row each [m/s]; infinite if u is not finite."""
     worst = check = 0.0
     for i in range(n):
         worst = max(worst, abs(min(u[i], p[i] * W[i, i])))
@@ -152,7 +157,11 @@ def normal_residual(n, p, u, W):
 
 @kernel
 def normal_sweeps(n, tolerance, limit, contacts):
-    """`cone_sweeps` for frictionless contacts: projected Gauss-Seidel on u = W p + b, 0 <= p ⟂ u >= 0."""
+    """Solve n contacts without friction by projected Gauss-Seidel sweeps: u = W p + b, 0 <= p ⟂ u >= 0.
+
+    Sweeps end at a residual of at most `tolerance` [m/s], or after `limit` of them. `contacts.impulse` has the warm
+    start and gets the result. Returns (sweeps, residual [m/s]).
+    """
     p, u, W = contacts.impulse, contacts.velocity, contacts.delassus
     update_contact_velocities(n, W, p, contacts.bias, u)
     residual = normal_residual(n, p, u, W)
@@ -171,12 +180,13 @@ def normal_sweeps(n, tolerance, limit, contacts):
 
 @inlined
 def _solve_sliding_contact(r, bn, bx, by, p1, p2, mu, W):
-    """Impulse of one sliding contact that answers its free velocity b alone, and whether one was found.
+    """Solve one contact that slides, with all other impulses fixed: (found, p_n, tangential impulses).
 
-    With p = p_n (1, -μ d), p_n = -b_n / (W_nn - μ W_nt·d): the contact neither approaches nor leaves. What is
-    left is the angle of d for which the velocity across, g = e·u_t with e = n x d, vanishes: Newton's method
-    on the angle, g' = -d·u_t + e·(p_n' (W_tn - μ W_tt d) - μ p_n W_tt e), p_n' = μ p_n W_nt·e / (W_nn - μ
-    W_nt·d).
+    The contact has the rows r to r + 2 of W, and the velocity b = (bn, bx, by) without its own impulse; p1 and p2 are
+    its last tangential impulses. With the direction d of sliding, p = p_n (1, -μ d), and p_n = -b_n / (W_nn - μ W_nt·d)
+    stops the approach. The unknown is the angle of d, for which the velocity across, g = e·u_t with e = n x d,
+    vanishes. Newton's method finds it, with g' = -d·u_t + e·(p_n' (W_tn - μ W_tt d) - μ p_n W_tt e) and
+    p_n' = μ p_n W_nt·e / (W_nn - μ W_nt·d).
     """
     a, b, c = W[r, r], W[r, r + 1], W[r, r + 2]
     d, e, f = W[r + 1, r + 1], W[r + 1, r + 2], W[r + 2, r + 2]
@@ -211,20 +221,23 @@ def _solve_sliding_contact(r, bn, bx, by, p1, p2, mu, W):
 
 @kernel
 def _local_impulse(i, impulse, u, mu, W, local):
-    """Impulse of contact i that answers its own velocity, with all others unchanged: (normal, tangent 1, tangent 2)."""
+    """Solve contact i alone, with all other impulses fixed: its new impulse (normal, tangent 1, tangent 2) [N s].
+
+    `impulse` and u are impulses and velocities of all contacts; `local` is that of `invert_contact_blocks`.
+    """
     r = 3 * i
     p0, p1, p2 = impulse[r], impulse[r + 1], impulse[r + 2]
-    # Release: with no impulse of its own the contact already separates.
+    # Open: without an impulse of its own the contact separates.
     if u[r] - (W[r, r] * p0 + W[r, r + 1] * p1 + W[r, r + 2] * p2) >= 0.0:
         return 0.0, 0.0, 0.0
-    # Hold: the impulse that stops the contact point, if the cone allows it.
+    # Stick: the impulse that stops the contact point, if it is in the friction cone.
     q0 = p0 - (local[i, 0] * u[r] + local[i, 1] * u[r + 1] + local[i, 2] * u[r + 2])
     q1 = p1 - (local[i, 3] * u[r] + local[i, 4] * u[r + 1] + local[i, 5] * u[r + 2])
     q2 = p2 - (local[i, 6] * u[r] + local[i, 7] * u[r + 1] + local[i, 8] * u[r + 2])
     if q0 >= 0.0 and q1 * q1 + q2 * q2 <= (mu * q0) ** 2:
         return q0, q1, q2
-    # Slide: by turning the direction; else normal first, then the tangential step projected on the disk μ
-    # p_n.
+    # Slide: by Newton's method on the direction; if it fails, a step of the normal impulse, then one of the tangential
+    # impulse, projected on the disk of radius μ p_n.
     b0 = u[r] - (W[r, r] * p0 + W[r, r + 1] * p1 + W[r, r + 2] * p2)
     b1 = u[r + 1] - (W[r + 1, r] * p0 + W[r + 1, r + 1] * p1 + W[r + 1, r + 2] * p2)
     b2 = u[r + 2] - (W[r + 2, r] * p0 + W[r + 2, r + 1] * p1 + W[r + 2, r + 2] * p2)
@@ -245,7 +258,11 @@ def _local_impulse(i, impulse, u, mu, W, local):
 
 @inlined
 def _extrapolate(n, mu, ratio, scratch):
-    """Add the rest of the geometric series of its changes to p, project it into the cones, and update u = W p + b."""
+    """Extrapolate the impulses p of n contacts, whose changes shrink by `ratio` from sweep to sweep.
+
+    The rest of the geometric series of changes is added to p. The sum is projected into the friction cones, and
+    u = W p + b is updated.
+    """
     contacts = scratch.contacts
     p, change = contacts.impulse, scratch.solver.change
     s = ratio / (1.0 - ratio)
@@ -263,15 +280,17 @@ def _extrapolate(n, mu, ratio, scratch):
 
 @kernel
 def cone_sweeps(n, mu, tolerance, limit, scratch):
-    """Sweep until the residual is at most `tolerance` [m/s] or `limit` sweeps are done.
+    """Solve n contacts with friction by sweeps, until the residual is at most `tolerance` [m/s], or `limit` are made.
 
-    `contacts.impulse` holds the warm start and receives the result, `contacts.velocity` the contact velocities.
+    `contacts.impulse` has the warm start and gets the result; `contacts.velocity` gets the contact velocities. mu has
+    the friction coefficients.
 
     Returns
     -------
     sweeps : int
+        Number of sweeps made.
     residual : float
-        [m/s], measured on the returned impulses.
+        Residual of the resulting impulses [m/s], measured.
     """
     contacts = scratch.contacts
     p, u, W = contacts.impulse, contacts.velocity, contacts.delassus

@@ -1,4 +1,4 @@
-"""Distribute a total impulse and its moment among sticking contacts; see `sticking`."""
+"""Distribute a total impulse and its moment among sticking contacts, by the formulas of `sticking`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from physics.kernels.math.simd_gather import gather_column, gather_numbers, vali
 from physics.kernels.math.vector import minus
 from physics.kernels.state.layout import WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2
 
-# Weighted sharings of the tangential impulses at most: nine in ten of those that hold take ten.
+# Largest number of iterations for the weights of the tangential impulses; nine in ten solutions need at most ten.
 _MAX_WEISZFELD_STEPS = 40
 
 
 @inlined
 def solve_symmetric(k, b):
-    """x of K x = b for K = (k11, k12, k13, k22, k23, k33), by cofactors."""
+    """Solve K x = b for x, with the symmetric matrix K = (k11, k12, k13, k22, k23, k33), by cofactors."""
     k11, k12, k13, k22, k23, k33 = k
     c11 = k22 * k33 - k23 * k23
     c12 = k13 * k23 - k12 * k33
@@ -35,7 +35,7 @@ def solve_symmetric(k, b):
 
 @inlined
 def first_active(n, solver):
-    """Index of the first active contact."""
+    """Index of the first of n contacts with a flag in `solver.active`; 0 if there is none."""
     for i in range(n):
         if solver.active[i] != 0:
             return i
@@ -44,14 +44,19 @@ def first_active(n, solver):
 
 @inlined
 def is_in_cone(pn, pa, pb, body):
-    """True if an impulse (normal, tangents) is in the cone of friction."""
+    """True if the impulse (pn, pa, pb), normal and tangents, is in the friction cone of the body."""
     limit, b = body.mu * pn, pb / friction_ratio(body)
     return pa * pa + b * b <= limit * limit
 
 
 @inlined
 def distribute_by_bolt_group(n, count, c, F, a, scratch):
-    """Bolt-group impulses: (contact that pulls most or -1, whether all are in their cones)."""
+    """Write the impulses of the `count` active contacts by the bolt-group formula p_i = F/count + a x d_i.
+
+    c is the centroid of the contacts, F the total impulse, and a the vector K⁻¹ T of the formula (`sticking`). The
+    impulses go to `solver.normal` and `solver.across`. Returns (the contact that pulls most, or -1; whether all
+    impulses are in their friction cones).
+    """
     solver = scratch.solver
     walls = scratch.scene.walls
     lowest = 0.0
@@ -78,7 +83,7 @@ def distribute_by_bolt_group(n, count, c, F, a, scratch):
 
 @inlined
 def _coordinates_along(axis, n, contacts):
-    """Coordinates of the contacts along an axis."""
+    """Coordinates of n contacts along an axis, from the centre of mass, one lane each [m]."""
     return (
         axis[0] * gather_column(contacts.arm, 0, n)
         + axis[1] * gather_column(contacts.arm, 1, n)
@@ -88,15 +93,18 @@ def _coordinates_along(axis, n, contacts):
 
 @inlined
 def distribute_by_load(n, scratch):
-    """Distribute the tangential impulses of one wall like the normal ones; return whether all stay in their cones.
+    """Distribute the tangential impulses of the active contacts of one wall, so that all are in their friction cones.
 
-    With weights g_i, at first the normal impulses, their centre r_g, ρ_i = r_i - r_g: p_t,i = g_i u_i, where
+    Returns whether this succeeds; then `solver.across` is written. Their sum P_t and moment stay the same. Let g_i be
+    weights, at first the normal impulses p_n,i, r_g the centre of the contacts with these weights, and
+    ρ_i = r_i - r_g. The tangential impulses are p_t,i = g_i u_i with
 
-        u_i = P_t / Σg + α n x ρ_i,    α = T_n / Σ g ρ²
+        u_i = P_t / Σg + α n x ρ_i,    α = T_n / Σ g ρ²,
 
-    and T_n is the moment of the tangential impulses about r_g. The weights go half the way (their roots do) to where
-    all would be equally near to their cones, μ p_n / |u| (Weiszfeld's). The u_i are those of a rigid motion, in which
-    friction takes up Σ μ p_n,i |u_i| at most: where Σ p_t,i·u_i is more, no sharing holds.
+    where T_n is the moment of the tangential impulses about r_g. Weiszfeld's weights μ p_n,i / |u_i| would bring all
+    contacts equally near to their cones; the new weights are the geometric means of these and the old ones. The u_i are
+    velocities of a rigid motion, against which friction has at most the power Σ μ p_n,i |u_i|. If Σ p_t,i·u_i is
+    larger, no distribution is in the cones.
     """
     scene, contacts, solver = scratch.scene, scratch.contacts, scratch.solver
     walls, active, ratio = scene.walls, solver.active, friction_ratio(scratch.body)

@@ -1,12 +1,12 @@
-"""Contacts of one wall in the frame (n, a, b) of that wall, and the problem of a single contact in closed form.
+"""Solve the contact problem of a single contact, in the frame (n, a, b) of its wall: normal and two tangents.
 
-In that frame a contact is its coordinates (c, a, b) relative to the centre of mass, and the rows r x n, r x a,
-r x b of its Jacobian are (0, b, -a), (-b, 0, c), (a, -c, 0). A 3 x 3 block of W = J M⁻¹ Jᵀ is then a handful of
-products of K, the inverse inertia in that frame.
+In this frame a contact has the coordinates (c, a, b) relative to the centre of mass. The angular rows r x n, r x a,
+r x b of its Jacobian are (0, b, -a), (-b, 0, c), (a, -c, 0). So a 3 x 3 block of W = J M⁻¹ Jᵀ consists of a few
+products with K, the inverse inertia in this frame.
 
-One contact holds (3 x 3 solve, inside the cone), opens, or slides: then its impulse is p_n (1, -μ d) along the
-direction d of its own sliding, p_n = -b_n / (W_nn - μ W_nt·d) stops the approach, and what is left is the angle of
-d for which the velocity across, g = e·u_t with e = n x d, vanishes: Newton's method on the angle.
+A single contact opens, sticks (a 3 x 3 solve, with the impulse in the friction cone), or slides. A sliding contact has
+the impulse p_n (1, -μ d), with the direction d of its sliding. p_n = -b_n / (W_nn - μ W_nt·d) stops the approach. The
+unknown is the angle of d, for which the velocity across, g = e·u_t with e = n x d, vanishes. Newton's method finds it.
 """
 
 from __future__ import annotations
@@ -19,24 +19,26 @@ from physics.compiler.simd import lane_sqrt
 from physics.kernels.contact_solver.impulse_distribution import solve_symmetric
 from physics.kernels.math import quaternion as qt
 
-# Newton steps on an angle at most: three are usual at a tolerance of 1e-6.
+# Largest number of Newton steps on an angle: three are usual at a tolerance of 1e-6.
 _ANGLE_NEWTON_STEPS = 10
 
 # Largest turn of one Newton step [rad].
 _MAX_ANGLE_STEP = 1.0
 
-# A warm start is of other loads if its pushes are off by more than this share of what is needed.
+# A warm start belongs to other loads if its normal impulses differ by more than this share from those needed now.
 _WARM_START_TOLERANCE = 0.1
 
-# A vector whose square is no more has no direction: 1/square would overflow below 6e-309.
+# A vector with a squared length up to this has no direction: 1/square would overflow below 6e-309.
 MIN_SQUARED_NORM = 1.0e-290
 
-# What a contact was found to do.
+# Results for a contact: Newton's method failed, or the contact opens, sticks or slides.
 CONTACT_UNSOLVED, CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES = range(4)
 
 
 class FreeBody(NamedTuple):
-    """A body without its contact impulses, in the stretched frame (n, a, b) of a wall (`anisotropic_friction`).
+    """Motion and inertia of a body without contact impulses, in the stretched frame (n, a, b) of a wall.
+
+    The frame is that of `anisotropic_friction`; with a single friction coefficient it is the frame of the wall.
 
     Attributes
     ----------
@@ -61,7 +63,11 @@ class FreeBody(NamedTuple):
 
 @inlined
 def motion_in_wall_frame(R, v, L, axes, J):
-    """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity in the frame of the wall."""
+    """Inverse inertia (00, 01, 02, 11, 12, 22), velocity and angular velocity of a body in the frame of a wall.
+
+    R is the matrix of the principal frame, J the inverse moments; v and L are velocity and angular momentum, world
+    frame. `axes` are the wall's normal and tangents.
+    """
     e0, e1 = qt.transposed_matvec(R, axes[0]), qt.transposed_matvec(R, axes[1])
     e2 = qt.transposed_matvec(R, axes[2])
     j0 = (J[0] * e0[0], J[1] * e0[1], J[2] * e0[2])
@@ -75,7 +81,10 @@ def motion_in_wall_frame(R, v, L, axes, J):
 
 @inlined
 def wall_to_world(axes, a, b, c, base):
-    """base + a axes[0] + b axes[1] + c axes[2]."""
+    """Add a vector with the components (a, b, c) along three axes to the world vector `base`.
+
+    The result is base + a axes[0] + b axes[1] + c axes[2]; `axes` are a wall's normal and tangents, world frame.
+    """
     n, t1, t2 = axes
     return (
         base[0] + (a * n[0] + b * t1[0] + c * t2[0]),
@@ -86,14 +95,17 @@ def wall_to_world(axes, a, b, c, base):
 
 @inlined
 def point_velocity(r, u, w):
-    """u + ω x r in the frame of the wall: (normal, tangents)."""
+    """Velocity u + ω x r of the point r of a body with velocity u and angular velocity w = ω, all in one frame."""
     m = qt.cross(w, r)
     return u[0] + m[0], u[1] + m[1], u[2] + m[2]
 
 
 @inlined
 def delassus_block(r, s, inv_mass, ratio, K):
-    """W between contacts r and s: velocity at r, row by row, per impulse at s; ratio: see `anisotropic_friction`."""
+    """Delassus block of two contacts at r and s: velocity at r per impulse at s, nine numbers row by row [1/kg].
+
+    K is the inverse inertia in the wall's frame, `ratio` the `friction_ratio` of `anisotropic_friction`.
+    """
     c, a, b = s
     n0, n1, n2 = b * K[1] - a * K[2], b * K[3] - a * K[4], b * K[4] - a * K[5]
     s0, s1, s2 = c * K[2] - b * K[0], c * K[4] - b * K[1], c * K[5] - b * K[2]
@@ -108,7 +120,10 @@ def delassus_block(r, s, inv_mass, ratio, K):
 
 @inlined
 def diagonal_delassus_block(r, inv_mass, ratio, K):
-    """`delassus_block` of a contact with itself, which is symmetric."""
+    """Delassus block of the contact at r with itself, symmetric, nine numbers row by row [1/kg]: its mobility.
+
+    K is the inverse inertia in the wall's frame, `ratio` the `friction_ratio` of `anisotropic_friction`.
+    """
     c, a, b = r
     n1, n2 = b * K[3] - a * K[4], b * K[4] - a * K[5]
     s0, s1, s2 = c * K[2] - b * K[0], c * K[4] - b * K[1], c * K[5] - b * K[2]
@@ -123,19 +138,25 @@ def diagonal_delassus_block(r, inv_mass, ratio, K):
 
 @inlined
 def inverse_root(square):
-    """1/√x of a number or of lanes; root and quotient are computed side by side, to shorten the wait for the result."""
+    """Inverse square root 1/√x of a number or of lanes, x = `square`, as √x · (1/x).
+
+    Root and quotient are computed at the same time, so the result is ready earlier.
+    """
     return lane_sqrt(square) * (1.0 / square)
 
 
 @inlined
 def is_warm_start_valid(push, needed):
-    """True if a warm start's push is so close to the push under the present loads that its friction is valid, too."""
+    """True if a warm start belongs to the present loads, so that its friction can be used.
+
+    `push` is the sum of its normal impulses, and `needed` that under the present loads, in the same unit.
+    """
     return abs(push - needed) <= _WARM_START_TOLERANCE * abs(needed)
 
 
 @inlined
 def friction_direction(x, y, mu):
-    """Vector -μ times the direction of (x, y); 0 if (x, y) has no direction."""
+    """Friction per normal impulse of a contact that slides along (x, y): -μ times the unit vector, 0 if x = y = 0."""
     square = x * x + y * y
     if not square > MIN_SQUARED_NORM:
         return 0.0, 0.0
@@ -145,7 +166,7 @@ def friction_direction(x, y, mu):
 
 @inlined
 def rotate_direction(x, y, angle):
-    """Vector (x, y) turned by about `angle`, with its length kept."""
+    """Turn the vector (x, y) by about `angle` [rad], by less than π/2 and with its length kept."""
     t = min(_MAX_ANGLE_STEP, max(-_MAX_ANGLE_STEP, angle))
     s = inverse_root(1.0 + t * t)
     return s * (x - t * y), s * (y + t * x)
@@ -153,7 +174,10 @@ def rotate_direction(x, y, angle):
 
 @inlined
 def sliding_residual(across, along, weight):
-    """Residual of a sliding contact [m/s]: velocity across its direction, along it, μ p trace(W_tt)."""
+    """Residual of a sliding contact [m/s], from its velocities across and along its assumed direction of sliding.
+
+    `weight` is μ p_n trace(W_tt) [m/s]. The residual is infinite if the contact moves backwards.
+    """
     if not weight > 0.0:
         return 0.0
     if not along > 0.0:
@@ -163,31 +187,34 @@ def sliding_residual(across, along, weight):
 
 @inlined
 def solve_contact_block(W, b, mu, trace, goal, x, y, may_hold):
-    """Impulse of one contact that answers its free velocity b alone.
+    """Solve the contact problem of one contact, u = W p + b with Coulomb's law.
 
     Parameters
     ----------
     W : tuple of 9 floats
-        Its block, symmetric.
+        Delassus block of the contact, symmetric, row by row [1/kg].
     b : tuple of 3 floats
-        Velocity less the target [m/s].
+        Velocity without its impulse, less the target: (normal, tangents) [m/s].
+    mu : float
+        Coefficient of friction.
     trace : float
-        W_aa + W_bb of the contact, which the residual is measured with: `W` may be less, when others give way.
+        W_aa + W_bb of the contact's own block [1/kg], by which the residual is measured. `W` may be smaller, if other
+        contacts respond to this one.
     goal : float
         Tolerance of the residual [m/s].
     x, y : float
-        First guess of -μ d; 0, 0: none.
+        First guess of -μ d, with the direction d of sliding; (0, 0) if there is none.
     may_hold : bool
-        False: leave out that it holds (then W may be singular).
+        False if the contact is not to stick; then W may be singular.
 
     Returns
     -------
     what : int
-        CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES, or CONTACT_UNSOLVED when Newton's method failed.
+        CONTACT_OPENS, CONTACT_STICKS, CONTACT_SLIDES, or CONTACT_UNSOLVED if Newton's method failed.
     p : tuple of 3 floats
-        [N s].
+        Impulse (normal, tangents) [N s].
     residual : float
-        [m/s].
+        Residual [m/s].
     """
     if b[0] >= 0.0:
         return CONTACT_OPENS, (0.0, 0.0, 0.0), 0.0

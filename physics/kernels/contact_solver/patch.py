@@ -1,7 +1,8 @@
-"""Data of a patch: three or four contacts of one wall, a lane each, and the groups that its solvers share.
+"""Data of a patch, three or four contacts of one wall, that its solvers share: one SIMD lane for each contact.
 
-Vectors are in the stretched frame of `anisotropic_friction`; where friction is the same in all directions this is the
-frame of the wall. Of three contacts the fourth lane is a copy of the third, which never pushes.
+Vectors have the components (normal, tangent a, tangent b) in the stretched frame of `anisotropic_friction`. If friction
+is the same in all directions, this is the frame of the wall. For three contacts the fourth lane is a copy of the third,
+which never pushes.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from physics.kernels.math.simd_gather import gather_column
 
 
 class Patch(NamedTuple):
-    """Contacts of one wall, a lane each.
+    """Geometry and targets of the contacts of one wall, one lane for each contact.
 
     Attributes
     ----------
     points : tuple of 3 lanes
         Coordinates (normal, tangents) from the centre of mass [m].
     targets : tuple of 3 lanes
-        Velocities aimed at along the same axes [m/s].
+        Target velocities along the same axes [m/s].
     mobility : lanes
         W_aa + W_bb of each contact [1/kg].
     """
@@ -34,20 +35,20 @@ class Patch(NamedTuple):
 
 
 class PatchProblem(NamedTuple):
-    """Contact problem of a patch.
+    """Contact problem of a patch: its contacts, the body without contact impulses, and tolerances.
 
     Attributes
     ----------
     patch : Patch
         The contacts.
     body : FreeBody
-        The body without their impulses.
+        The body without contact impulses.
     mu : float
         Coefficient of friction along tangent a; 0 without friction.
     goal : float
         Tolerance of the residual [m/s].
     loose : float
-        Speed up to which an open contact may close while it is sought which others push [m/s].
+        Larger tolerance: speed up to which an open contact may close while the pushing contacts are searched [m/s].
     """
 
     patch: Patch
@@ -58,20 +59,22 @@ class PatchProblem(NamedTuple):
 
 
 class NormalMotion(NamedTuple):
-    """Motion along the normal that the pushing contacts must have, known before their impulses.
+    """Velocity along a wall's normal and turning about its tangents, by which pushing contacts meet normal targets.
+
+    This motion is known before the impulses are.
 
     Attributes
     ----------
     center : tuple of 3 floats
         Centroid (normal, tangents) of the contacts that push [m].
     wa, wb : float
-        Angular velocity about the tangents [rad/s].
+        Angular velocity about the tangents, after the impulses [rad/s].
     push : float
-        Sum of the normal impulses that it takes [N s].
+        Sum of the normal impulses [N s].
     y0 : float
-        Their mean [N s].
+        Mean of the normal impulses [N s].
     gain : tuple of 2 floats
-        Change of the angular velocity about the tangents that it takes [rad/s].
+        Change of the angular velocity about the tangents by the impulses [rad/s].
     """
 
     center: tuple
@@ -83,7 +86,7 @@ class NormalMotion(NamedTuple):
 
 
 class PatchFriction(NamedTuple):
-    """Friction of the contacts, and their slip.
+    """Friction of the contacts of a patch per normal impulse, and their slip speeds.
 
     Attributes
     ----------
@@ -101,7 +104,7 @@ class PatchFriction(NamedTuple):
 
 @inlined
 def patch_coordinates_along(axis, n, contacts):
-    """Coordinates of the contacts along an axis, from the centre of mass."""
+    """Coordinates of the first n contacts along an axis, from the centre of mass, one lane each [m]."""
     return (
         axis[0] * gather_column(contacts.arm, 0, n)
         + axis[1] * gather_column(contacts.arm, 1, n)
@@ -111,7 +114,7 @@ def patch_coordinates_along(axis, n, contacts):
 
 @inlined
 def gather_patch(n, body, scratch):
-    """The `Patch` of the n contacts in `scratch`, on the wall of `body`."""
+    """Gather the `Patch` of the n contacts in `scratch`, in the frame of the wall that `body` (`FreeBody`) is in."""
     contacts = scratch.contacts
     axes, inv_mass, K, ratio = body.axes, body.inv_mass, body.K, friction_ratio(scratch.body)
     c, a, b = (

@@ -1,8 +1,8 @@
-"""Sums over the contacts of a patch on one wall, with the formulas of `sliding_patch` and `primal_dual_friction`.
+"""Evaluate the formulas of `sliding_patch` and `primal_dual_friction`, by sums over the contacts of a patch.
 
-A patch (`Patch`) has three or four contacts, a lane each (`simd`); the fourth lane of three is the third contact once
-more, and never pushes. All is in the stretched frame of `anisotropic_friction` (of an even wall: its frame). Names that
-recur without a group of their own:
+A patch (`Patch`) has three or four contacts, one SIMD lane each. For three contacts the fourth lane is the third
+contact again, which never pushes. Vectors are in the stretched frame (n, a, b) of `anisotropic_friction`; with a single
+friction coefficient it is the frame of the wall. These arguments and results have the same meaning everywhere:
 
 on : lanes
     1 for a contact that pushes, 0 for one that is open.
@@ -34,13 +34,16 @@ from physics.kernels.contact_solver.one_contact import (
 )
 from physics.kernels.contact_solver.patch import NormalMotion, PatchFriction
 
-# Second moments of a patch: below this share of det to trace² it counts as a line (edges 1 : 1000).
+# A patch counts as a line if the determinant of its second moments is below this share of trace² (edges 1 : 1000).
 _COLLINEAR_LIMIT = 1.0e-6
 
 
 @inlined
 def largest_free_speed(friction, patch, body):
-    """Largest velocity of a contact without impulses, less its target [m/s]."""
+    """Largest component of the contact velocities without impulses, less their targets [m/s].
+
+    `friction` is None without friction; then only normal components count. `body` is a `FreeBody`.
+    """
     target, speed = patch.targets, point_velocity(patch.points, body.u, body.w)
     worst = abs(speed[0] - target[0])
     if friction is not None:
@@ -50,7 +53,7 @@ def largest_free_speed(friction, patch, body):
 
 @inlined
 def patch_centroid(count, patch, on):
-    """Centroid of the active contacts."""
+    """Centroid (normal, tangents) of the `count` pushing contacts of a patch, those with `on` = 1 [m]."""
     c, a, b = patch.points
     s = 1.0 / count
     return s * lane_sum(on * c), s * lane_sum(on * a), s * lane_sum(on * b)
@@ -58,9 +61,11 @@ def patch_centroid(count, patch, on):
 
 @inlined
 def fit_normal_motion(count, patch, on):
-    """Normal motion that best fits the active contacts' targets: (whether one exists, centroid, (v_n, ω_a, ω_b)).
+    """Fit a normal motion to the normal targets of the `count` pushing contacts (`on` = 1), by least squares.
 
-    Contacts on a line give a motion that is not finite, or inaccurate; then there is none.
+    The motion is (v_n, ω_a, ω_b): the velocity along the wall's normal, and the angular velocities about its tangents.
+    Returns (is_patch, centroid of the contacts [m], motion). If the contacts are on a line, is_patch is False, and the
+    motion is inaccurate or not finite.
     """
     _, a, b = patch.points
     target = patch.targets[0]
@@ -81,14 +86,20 @@ def fit_normal_motion(count, patch, on):
 
 @inlined
 def normal_velocity_excess(patch, vn, wa, wb):
-    """Normal velocities of the contacts minus their targets [m/s] in a normal motion; an open contact may exceed 0."""
+    """Normal velocities of the contacts less their targets [m/s], in the normal motion (v_n, ω_a, ω_b) = (vn, wa, wb).
+
+    Pushing contacts should have 0 here, open contacts 0 or more.
+    """
     _, a, b = patch.points
     return (vn + wa * b - wb * a) - patch.targets[0]
 
 
 @inlined
 def normal_motion_about(count, center, motion, body):
-    """The `NormalMotion` (v_n, ω_a, ω_b) of `count` contacts about their centroid."""
+    """Make the `NormalMotion` of `count` contacts with the centroid `center`, for the `motion` (v_n, ω_a, ω_b).
+
+    `body` is the `FreeBody` before the impulses.
+    """
     vn, wa, wb = motion
     push = (vn - body.u[0]) / body.inv_mass
     return NormalMotion(center, wa, wb, push, push / count, (wa - body.w[1], wb - body.w[2]))
@@ -96,7 +107,10 @@ def normal_motion_about(count, center, motion, body):
 
 @inlined
 def patch_friction_directions(ua, ub, on, mu):
-    """`PatchFriction` of contacts that slide against a slip (ua, ub) [m/s]; zero for contacts open or at rest."""
+    """Make the `PatchFriction` of contacts that slide with the velocities (ua, ub) [m/s].
+
+    Friction is zero for contacts that are open or do not slip.
+    """
     square = ua * ua + ub * ub
     s = select_lanes(square > MIN_SQUARED_NORM, -mu * on * inverse_root(square), 0.0)
     return PatchFriction(s * ua, s * ub, lane_sqrt(square))
@@ -104,7 +118,11 @@ def patch_friction_directions(ua, ub, on, mu):
 
 @inlined
 def patch_slip_velocities(patch, motion, normal):
-    """Tangential velocities of the contacts less their targets [m/s] in a planar motion and a `NormalMotion`."""
+    """Tangential velocities of the contacts of a patch less their targets [m/s], two lanes.
+
+    `motion` is the body's planar motion (v_a, v_b, ω_n), along the wall and about its normal; `normal` is a
+    `NormalMotion`.
+    """
     c, a, b = patch.points
     _, target_a, target_b = patch.targets
     wa, wb = normal.wa, normal.wb
@@ -113,14 +131,16 @@ def patch_slip_velocities(patch, motion, normal):
 
 @inlined
 def solve_normal_slopes(patch, on, normal, friction, K):
-    """Slopes y_1, y_2 of the normal impulses that hold the `NormalMotion` under some `PatchFriction`.
+    """Solve for the slopes y_1, y_2 of normal impulses, affine in the place on the wall, that lead to a `NormalMotion`.
+
+    `friction` is the `PatchFriction` that goes with them, and K the inverse inertia of the body.
 
     Returns
     -------
     y : tuple of 2 floats
-        [N s/m].
+        Slopes (y_1, y_2) [N s/m].
     turning : tuple of 6 floats
-        (ω_a per y_1, y_2; ω_b per y_1, y_2; ω_n per y_1, y_2), friction along with them.
+        Changes of ω_a per y_1 and y_2, of ω_b per y_1 and y_2, and of ω_n per y_1 and y_2, with their friction.
     """
     c, a, b = patch.points
     x, y, center, y0, gain = friction.x, friction.y, normal.center, normal.y0, normal.gain
@@ -140,9 +160,11 @@ def solve_normal_slopes(patch, on, normal, friction, K):
 
 @inlined
 def planar_compliance(problem, normal, friction, turning, body):
-    """Planar motion per planar impulse at the centroid, row by row (9): with the normal motion held by y_1, y_2.
+    """Planar compliance C: change of the planar motion (v_a, v_b, ω_n) per planar impulse at the contacts' centroid.
 
-    `friction` and `turning` are those of `solve_normal_slopes`. Only a step of Newton's method needs the compliance.
+    It is nine numbers, row by row. The slopes y_1 and y_2 respond to the impulse, so that the normal motion stays the
+    same. `friction` and `turning` are those of
+    `solve_normal_slopes`. `body` is the body's record.
     """
     _, a, b = problem.patch.points
     x, y, K, inv_mass, ratio = friction.x, friction.y, problem.body.K, problem.body.inv_mass, friction_ratio(body)
@@ -160,7 +182,7 @@ def planar_compliance(problem, normal, friction, turning, body):
         mass_b * lane_sum(a * y),
         mass_b * lane_sum(b * y),
     )
-    # Motion per δω_a, δω_b made up for by y.
+    # Planar motion by the y that make up for δω_a and δω_b.
     pa, pb = s * (x1 * h2 - x2 * h1), s * (x2 * g1 - x1 * g2)
     qa, qb = s * (y1 * h2 - y2 * h1), s * (y2 * g1 - y1 * g2)
     ra, rb = s * (f1 * h2 - f2 * h1), s * (f2 * g1 - f1 * g2)
@@ -175,7 +197,7 @@ def planar_compliance(problem, normal, friction, turning, body):
 
 @inlined
 def patch_normal_impulses(patch, on, normal, y, friction):
-    """Normal impulses with the slopes y of `solve_normal_slopes`.
+    """Compute the normal impulses of the pushing contacts, with the slopes y of `solve_normal_slopes`.
 
     Returns
     -------
@@ -186,13 +208,13 @@ def patch_normal_impulses(patch, on, normal, y, friction):
     p : lanes
         Normal impulses [N s], 0 for contacts that would pull.
     exerted : tuple of 5 floats
-        Of these and their friction.
+        Sums of impulses and moments, of p and its friction (module docstring).
     """
     c, a, b = patch.points
     center, y0 = normal.center, normal.y0
     p = select_lanes(on > 0.0, y0 + (y[0] * (a - center[1]) + y[1] * (b - center[2])), 0.0)
     pulling, loser = select_lanes(p < 0.0, 1.0, 0.0), -1
-    if first_true_lane(~(p >= 0.0)) >= 0:  # so that what is no number also pulls
+    if first_true_lane(~(p >= 0.0)) >= 0:  # written so that NaN also counts as pulling
         loser = first_true_lane((on > 0.0) & ~(p > min_of_lanes(p)))
     p = larger(p, 0.0)
     px, py = p * friction.x, p * friction.y
@@ -202,7 +224,10 @@ def patch_normal_impulses(patch, on, normal, y, friction):
 
 @inlined
 def planar_motion_after(exerted, body, scratch):
-    """Planar motion after impulses along the tangents, and moments."""
+    """Planar motion (v_a, v_b, ω_n) of a body after contact impulses with the sums `exerted`.
+
+    `body` is the `FreeBody` before them.
+    """
     fa, fb, tn, ta, tb = exerted
     u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(scratch.body)
     mass_b = ratio * ratio * inv_mass
@@ -211,12 +236,17 @@ def planar_motion_after(exerted, body, scratch):
 
 @inlined
 def patch_sliding_residual(patch, p, friction, mu, delta):
-    """Largest tangential residual [m/s] if all slide, when the motion changes by delta but the directions stay.
+    """Tangential residual of sliding contacts, and the matrix H of `sliding_patch`.
 
-    Only contacts with a push p > 0 count. A contact that moves backwards counts with its whole velocity: its impulse is
-    in the cone, and projections do not lengthen.
+    `friction` has the directions of a planar motion, and the impulses lead to another one, which differs by `delta`.
 
-    Also H = Σ κ h hᵀ (11, 12, 13, 22, 23, 33): how the friction across grows with the planar motion.
+    Returns
+    -------
+    worst : float
+        Largest residual of contacts with p > 0 [m/s]. A contact that moves backwards counts with its whole velocity,
+        which is an upper bound, since its impulse is in the friction cone and projections do not lengthen.
+    H : tuple of 6 floats
+        Σ κ h hᵀ (11, 12, 13, 22, 23, 33): growth of the friction across the directions with the planar motion.
     """
     if not mu > 0.0:
         return 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -243,14 +273,17 @@ def patch_sliding_residual(patch, p, friction, mu, delta):
 
 @inlined
 def has_turned_far(on, d, size, change):
-    """Mark slips, of direction d and this size [m/s], that turn by more than about 70 degrees by a change."""
+    """Mask of pushing contacts (`on` = 1) whose slip turns by more than about 70 degrees when `change` [m/s] is added.
+
+    d are the directions of the slip velocities, `size` their sizes [m/s].
+    """
     along, across = size + (d[0] * change[0] + d[1] * change[1]), d[0] * change[1] - d[1] * change[0]
     return (on * size > 0.0) & ~((along > 0.1 * size) & (abs(across) <= 3.0 * along))
 
 
 @inlined
 def has_small_turns(patch, on, friction, mu, step):
-    """True if, in a step of the motion, no direction turns by more than about 70 degrees, and none backwards."""
+    """True if a `step` of the planar motion (v_a, v_b, ω_n) turns no slip by more than about 70 degrees."""
     _, a, b = patch.points
     x, y, size = friction
     s = -1.0 / mu

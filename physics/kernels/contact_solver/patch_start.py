@@ -1,4 +1,7 @@
-"""Start of a patch's solve: the impulses of the last stage, or a guess where they belong to other loads."""
+"""Start of the solve of a patch: from the impulses of the last stage, or from a guess if these belong to other loads.
+
+A planar motion is (v_a, v_b, ω_n): velocity along the two tangents [m/s], and spin about the normal [rad/s].
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,16 @@ from physics.kernels.contact_solver.patch import patch_coordinates_along
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.simd_gather import gather_component, valid_lanes_mask
 
-# Share of its free slip that a face which nearly holds starts with.
+# Share of its free slip with which the solve of a face that nearly sticks starts.
 _MIN_SLIP_SHARE = 0.01
 
 
 @inlined
 def warm_start_motion(n, patch, on, body, scratch):
-    """Planar motion after the warm-start impulses in `scratch`, and whether these belong to the present loads."""
+    """Planar motion (v_a, v_b, ω_n) after the warm-start impulses, and whether these belong to the present loads.
+
+    `on` is 1 in the lanes of the n contacts, 0 in a surplus lane.
+    """
     contacts = scratch.contacts
     c, a, b = patch.points
     u, w, K, inv_mass, ratio = body.u, body.w, body.K, body.inv_mass, friction_ratio(scratch.body)
@@ -31,7 +37,10 @@ def warm_start_motion(n, patch, on, body, scratch):
 
 @inlined
 def warm_start_friction(n, on, scratch):
-    """Impulses per normal impulse along the tangents (two lanes) of those in `scratch`; 0 where nothing pushes."""
+    """Tangential impulses per normal impulse of the warm start of n contacts in `scratch`: lanes x and y.
+
+    They are 0 for a contact without a normal impulse. `on` is 1 in the lanes of the n contacts, 0 in a surplus lane.
+    """
     contacts = scratch.contacts
     p = on * gather_component(contacts.impulse, 0, n)
     s = select_lanes(p > 0.0, 1.0 / p, 0.0)
@@ -41,7 +50,10 @@ def warm_start_friction(n, on, scratch):
 
 @inlined
 def _centroid_and_variance(n, a, b, on):
-    """Centroid of the contacts along the tangents, and mean square of their distances from it."""
+    """Centroid (two numbers) of n contacts at the tangential coordinates a, b, and their mean squared distance from it.
+
+    `on` is 1 in the lanes of the contacts, 0 in a surplus lane.
+    """
     share = 1.0 / n
     ca, cb = share * lane_sum(on * a), share * lane_sum(on * b)
     a, b = on * (a - ca), on * (b - cb)
@@ -50,11 +62,12 @@ def _centroid_and_variance(n, a, b, on):
 
 @inlined
 def may_stick(n, axes, v, L, scratch):
-    """True if friction may stop a face with the velocity v and angular momentum L before friction.
+    """True if friction may stop a face of n contacts, with velocity v and angular momentum L without impulses.
 
-    A sticking face stops at its wall. The pushes P remove the normal momentum, and friction, at most μP, the tangential
-    one. Its moment about the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. So the result is True for every face
-    that can stick. A face that slips within the tolerance of a solve would be taken for sticking, and creep.
+    The result is true for every face that can stick. A sticking face stops at its wall: normal impulses of the sum P
+    remove the normal momentum, and friction, at most μP, removes the tangential momentum. The moment of friction about
+    the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. If all faces were tried as sticking, one that slips within
+    the tolerance of a solve would be taken for sticking, and creep. `axes` are normal and tangents of the wall.
     """
     body = scratch.body
     ratio, friction = friction_ratio(body), body.mu * qt.dot(axes[0], v)
@@ -74,16 +87,19 @@ def may_stick(n, axes, v, L, scratch):
 
 @inlined
 def cold_start_motion(n, patch, on, mu, body):
-    """Planar motion after friction, if planar friction is that of an ellipsoid, from the motion without impulses.
+    """Estimate the planar motion (v_a, v_b, ω_n) of a body after friction at a face, by an ellipsoidal limit surface.
 
-    The forces and moments about the centroid that equal pushes, P in all, can exert while a face slides are nearly an
-    ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal, (v, ρ² ω) (Goyal et al. 1991; Howe and
-    Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I and the slip's size s, s² = v² + ρ²ω²,
+    `body` is the body without impulses, mu its friction coefficient, and `on` is 1 in the lanes of the n contacts.
+
+    Let equal normal impulses have the sum P. The friction forces f and moments T about the centroid that they can exert
+    while the face slides nearly fill an ellipsoid, (|f|/μP)² + (T/μPρ)² <= 1, and the slip is along its normal,
+    (v, ρ² ω) (Goyal et al. 1991; Howe and Cutkosky 1996). With ρ² = Σ|d_i|²/n, β = μP/m, γ = μPρ²/I, the velocities v₀
+    and ω₀ before, and the size s of the slip after, s² = v² + ρ²ω²,
 
         v = v₀ s/(s + β),   ω = ω₀ s/(s + γ),   φ(s)² = v₀²/(s + β)² + ρ²ω₀²/(s + γ)² = 1.
 
-    1/φ is nearly a straight line and concave. One Newton step from a point where it is at most 1 is accurate enough. A
-    face with φ(0) <= 1 would stick; it keeps a small part of its slip, since directions are needed.
+    1/φ is concave and nearly a straight line. So one Newton step, from a point where it is at most 1, is accurate
+    enough. A face with φ(0) <= 1 would stick; it keeps a small part of its slip, since its direction is needed.
     """
     _, a, b = patch.points
     u, w, inv_mass = body.u, body.w, body.inv_mass

@@ -1,18 +1,23 @@
-"""Friction of a patch whose sliding directions would reverse: impulses anywhere in the disc, primal-dual Newton.
+"""Solve the friction of a patch in which some contacts stick, by a primal-dual Newton's method.
 
-Of a contact that stops, or nearly stops, a direction says nothing. So its friction -μ p z, |z| <= 1, is sought beside
-the planar motion τ: z |u| = u, so that what slides has z = d, and what holds has u = 0 and any z in the disc.
-Linearised about both, with d = u/|u|,
+It is used where sliding directions would reverse. If a contact stops or nearly stops, its direction is not defined. So
+the unknowns are the planar motion τ of the body and, for each contact, a vector z with |z| <= 1 that gives its friction
+-μ p z. They obey z |u| = u: a sliding contact has z = d, the unit vector of its slip u, and a sticking contact has
+u = 0 and any z in the disc. Linearised about both unknowns, with d = u/|u|,
 
     z' = (u + A δu)/|u|,   A = 1 - z dᵀ,   δu_i = G_i Δ,
-    (1 + C H) Δ = δ - C Σ μ p_i G_iᵀ (d_i - z_i),   H = Σ κ_i G_iᵀ A_i G_i,   κ = μ p/|u|,
+    (1 + C H) Δ = δ - C Σ μ p_i G_iᵀ (d_i - z_i),   H = Σ κ_i G_iᵀ A_i G_i,   κ = μ p/|u|.
 
-where δ is by how much the motion that the impulses lead to differs from τ, C is `patch_algebra.planar_compliance`, and
-G_i τ the velocity of contact i. With z = d this is the step of `sliding_patch`; with A = 1 it is one of Weiszfeld's,
-friction as a viscous drag, which slows what stops, and is taken where a direction would turn round. From there z of
-what stops is within the disc, and what is solved for is its impulse. Once its slip is lost in rounding, u/|u| says
-nothing: z' = z + (u + δu)/s with a small speed s, on which the solution does not depend. A motion about one contact
-that holds takes five rounds or six.
+Δ is the step of τ, and δ the difference between the planar motion to which the impulses lead and τ. C is
+`patch_algebra.planar_compliance`, and G_i τ the velocity of contact i.
+
+- With z = d this is the step of `sliding_patch`.
+- With A = 1 it is a *viscous* step, one of Weiszfeld's: friction acts as a viscous drag, which slows a contact that
+  stops. It is made where a direction would reverse. Afterwards z of a stopping contact is within the disc.
+- When the slip of a sticking contact is lost in rounding, u/|u| is undefined. Then z' = z + (u + δu)/s with a small
+  speed s, on which the solution does not depend.
+
+A motion about one sticking contact needs five or six rounds.
 
 References
 ----------
@@ -42,31 +47,31 @@ from physics.kernels.contact_solver.patch_algebra import (
 )
 from physics.kernels.math import quaternion as qt
 
-# Rounds at most.
+# Largest number of rounds.
 _MAX_DUAL_ROUNDS = 24
 
-# Share of the tolerance below which a slip has no direction.
+# A slip below this share of the tolerance has no direction.
 _NO_DIRECTION_SHARE = 1.0e-3
 
-# Share of the largest free contact speed that s is, and below which a slip is too small for u/|u|: that would be off by
-# rounding over slip, and impulses with it.
+# The speed s, as a share of the largest free contact speed. For a smaller slip u/|u| has a large error by rounding, and
+# so would the impulses.
 _REGULARISATION_SHARE = 1.0e-7
 
-# A contact slides whose friction is no less than this share of μ p.
+# A contact counts as sliding if its friction is at least this share of μ p.
 _FULL_FRICTION_SHARE = 0.999999
 
-# What came out.
+# Results of a round.
 ROUND_FAILED, ROUND_SOLVED, ROUND_PULLS = range(3)
 
 
 class PatchRound(NamedTuple):
-    """Result of a round of `sliding_patch`, or of all rounds of this method.
+    """Result of one round of `sliding_patch`, or of all rounds of `solve_stick_slip_patch`.
 
     Attributes
     ----------
     what : int
-        `ROUND_SOLVED`; `ROUND_PULLS`: the contact `loser` would have to pull; `ROUND_FAILED`; or one of those of
-        `sliding_patch`.
+        `ROUND_SOLVED`; `ROUND_PULLS`, if the contact `loser` would have to pull; `ROUND_FAILED`; or one of the ROUND_
+        codes of `sliding_patch`.
     loser : int
         The contact that would have to pull most, or -1.
     p : lanes
@@ -74,7 +79,7 @@ class PatchRound(NamedTuple):
     x, y : lanes
         Impulses along the tangents per normal impulse.
     exerted : tuple of 5 floats
-        Of these: impulses along the tangents [N s] and moments [N m s].
+        Sums of the impulses along the tangents [N s], and of the moments [N m s].
     miss : float
         Residual [m/s].
     motion : tuple of 3 floats
@@ -92,14 +97,14 @@ class PatchRound(NamedTuple):
 
 
 class SlipLimits(NamedTuple):
-    """Slips below which a direction is undefined.
+    """Speeds that take the place of smaller slips, whose directions are undefined.
 
     Attributes
     ----------
     tiny : float
-        Size that a slip counts as at least, where a contact slides [m/s].
+        Smallest slip of a contact that slides [m/s].
     slow : float
-        The speed s, instead of the size of a smaller slip, where a contact holds [m/s].
+        Smallest slip of a contact that sticks: the speed s of the module docstring [m/s].
     """
 
     tiny: float
@@ -108,7 +113,10 @@ class SlipLimits(NamedTuple):
 
 @inlined
 def solve_planar_step(compliance, h, r):
-    """Solve (1 + C H) Δ = r for the step Δ, with H row by row (9), by Cramer's rule."""
+    """Solve (1 + C H) Δ = r for the step Δ of the planar motion (v_a, v_b, ω_n), by Cramer's rule.
+
+    `compliance` is C and h is H, each nine numbers row by row.
+    """
     c0, c1, c2, c3, c4, c5, c6, c7, c8 = compliance
     h00, h01, h02, h10, h11, h12, h20, h21, h22 = h
     x = (
@@ -133,10 +141,11 @@ def solve_planar_step(compliance, h, r):
 
 @inlined
 def _friction_residual(mobility, p, friction, mu, after):
-    """Largest tangential residual [m/s] of pushes p and their `PatchFriction` for the slips `after`.
+    """Largest tangential residual of a patch [m/s], with normal impulses p and their `PatchFriction`.
 
-    The natural map of Coulomb's disc, |f - P(f - u/W)| W of the impulse f with W = W_aa + W_bb, which is at least 1/ρ
-    of its own (`gauss_seidel`); P projects onto the disc |f| <= μ p.
+    `after` are the slips u to which the impulses lead, and `mobility` is W = W_aa + W_bb of each contact. The residual
+    is the natural map of Coulomb's disc, |f - P(f - u/W)| W for the tangential impulse f, where P projects onto the
+    disc |f| <= μ p. As W is at least 1/ρ_t, it bounds the residual of `gauss_seidel`.
     """
     if not mu > 0.0:
         return 0.0
@@ -153,7 +162,11 @@ def _friction_residual(mobility, p, friction, mu, after):
 
 @inlined
 def _newton_step(patch, load, d, size, gain, taken, compliance, delta):
-    """Step Δ of the planar motion, and δu: z' = z + gain + A δu/size, A = 1 - `taken` dᵀ; `load` is μ p."""
+    """Newton step of the primal-dual method: the step Δ of the planar motion, and the changes δu of the slips.
+
+    The friction z' = z + gain + A δu/size, with A = 1 - `taken` dᵀ, is substituted. `load` is μ p, `size` the slips'
+    size |u| or the speed s, `compliance` C, and `delta` δ of the module docstring.
+    """
     _, a, b = patch.points
     (da, db), (ta, tb) = d, taken
     fa, fb = load * gain[0], load * gain[1]
@@ -178,7 +191,11 @@ def _newton_step(patch, load, d, size, gain, taken, compliance, delta):
 
 @inlined
 def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
-    """Friction z' of the next round; u'/|u'| for sliding contacts and outside the disc, shortened if it reverses."""
+    """Friction z' of the next round (two lanes), after a step that changes the slips u by `change`.
+
+    It is z + gain + A δu/size of `_newton_step`. Contacts that slide (`slides`), or whose z' is outside the disc in
+    about the direction of their new slip u', get u'/|u'|. Other z' outside the disc are shortened to length 1.
+    """
     s = d[0] * change[0] + d[1] * change[1]
     za = z[0] + (gain[0] + (change[0] - taken[0] * s) / size)
     zb = z[1] + (gain[1] + (change[1] - taken[1] * s) / size)
@@ -191,7 +208,11 @@ def _next_friction(u, d, size, z, gain, taken, change, slides, tiny):
 
 @kernel
 def take_viscous_step(problem, on, p, friction, compliance, delta):
-    """First step, from all contacts sliding, with A = 1: (step of the planar motion, impulses per normal impulse)."""
+    """Make a viscous step, with A = 1, from contacts that all slide.
+
+    p are normal impulses, `friction` is their `PatchFriction`. Returns the step of the planar motion, and lanes x and y
+    with the tangential impulses per normal impulse after it.
+    """
     patch, mu, goal = problem.patch, problem.mu, problem.goal
     size, s = larger(friction.speed, _NO_DIRECTION_SHARE * goal), -1.0 / mu
     d, none = (s * friction.x, s * friction.y), Lanes(0.0, 0.0, 0.0, 0.0)
@@ -204,16 +225,18 @@ def take_viscous_step(problem, on, p, friction, compliance, delta):
 
 @inlined
 def _primal_dual_step(problem, on, p, friction, u, compliance, delta, limits):
-    """Take one step from `friction`, where the contacts slip by u [m/s].
+    """Make one step of the primal-dual method from `friction` (`PatchFriction`) and the slips u [m/s].
+
+    If a sliding direction would reverse, the step is a viscous one.
 
     Returns
     -------
     step : tuple of 3 floats
-        Of the planar motion.
+        Step of the planar motion.
     x, y : lanes
-        Impulses along the tangents per normal impulse after it.
+        Impulses along the tangents per normal impulse after the step.
     is_settled : bool
-        Whether no direction turned round.
+        True if no direction would have reversed.
     """
     patch, mu, speed, (tiny, slow) = problem.patch, problem.mu, friction.speed, limits
     z, load, none = (friction.x / -mu, friction.y / -mu), mu * p, Lanes(0.0, 0.0, 0.0, 0.0)
@@ -235,26 +258,28 @@ def _primal_dual_step(problem, on, p, friction, u, compliance, delta, limits):
 
 @kernel
 def solve_stick_slip_patch(patient, on, x, y, problem, normal, motion, scratch):
-    """Impulses of a patch in which some contacts stick, and the other active ones slide.
+    """Solve a patch in which some pushing contacts stick, and the others slide.
 
     Parameters
     ----------
     patient : bool
-        Whether a contact that pulls may push again while directions still turn, down to a residual of `problem.loose`.
+        True: a contact that would pull stays among the pushing ones while directions still turn, until the residual is
+        at most `problem.loose`. False: the method ends with `ROUND_PULLS` at once.
     on : lanes
-        Which contacts push.
+        1 for contacts that push, 0 for open ones.
     x, y : lanes
-        First guess of the impulses per normal impulse along the tangents, -μ z.
+        First guess of the impulses along the tangents per normal impulse, -μ z.
     problem : PatchProblem
+        The contact problem.
     normal : NormalMotion
-        Of the contacts that push.
+        Normal motion of the contacts that push.
     motion : tuple of 3 floats
         First guess of the planar motion (v_a, v_b, ω_n).
 
     Returns
     -------
     PatchRound
-        `ROUND_SOLVED`, `ROUND_PULLS` or `ROUND_FAILED`.
+        Its `what` is `ROUND_SOLVED`, `ROUND_PULLS` or `ROUND_FAILED`.
     """
     patch, mu, goal, may_open = problem.patch, problem.mu, problem.goal, not patient
     limits = SlipLimits(_NO_DIRECTION_SHARE * goal, _REGULARISATION_SHARE * goal / scratch.settings.tolerance)

@@ -1,17 +1,17 @@
-"""Newton's method on the twist, inside a proximal-point iteration, for contact problems on which sweeps crawl.
+"""Solve contact problems by Newton's method on the body's twist, inside a proximal point method.
 
-On the verge of sliding (all contacts nearly hold, or creep, or one holds while others slide) sweeps converge
-as slowly as one likes, and four contacts of a face leave the impulses undetermined. The change x of the
-body's twist is determined, and has six components however many contacts there are. For impulses q near the
-solution let
+It is for problems on which sweeps converge slowly: bodies on the verge of sliding, whose contacts nearly stick, or
+creep, or of which one sticks while others slide. Four contacts of a face also leave the impulses undetermined. The
+change x of the body's twist is determined, and has six components for any number of contacts. Let q be impulses near
+the solution, and
 
-    p(x) = law(q - ρ u(x)),    u(x) = J x + b,
+    p(x) = law(q - ρ u(x)),    u(x) = J x + b.
 
-where the law takes max(0, p_n) and then projects p_t on the disk |p_t| <= μ p_n, contact by contact, with ρ a
-large multiple of the contact's mass. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twist alone, at most a
-few pieces away from linear; its Newton matrix 1 - M⁻¹ Jᵀ p'(u) J is never singular for want of determined
-impulses. Setting q = p(x) and starting again converges to the contact law itself, by about the factor
-1/(1 + ρ W) each time, so that a few rounds of growing ρ do.
+For each contact the law takes max(0, p_n), and then projects p_t on the disk |p_t| <= μ p_n; ρ is a large multiple of
+the contact's mass. Then x = M⁻¹ Jᵀ p(x) is a nonlinear system for the twist alone, and piecewise nearly linear. Its
+Newton matrix 1 - M⁻¹ Jᵀ p'(u) J is not singular when impulses are undetermined. A *round* solves this system and sets
+q = p(x). Each round brings q nearer to the contact law, by about the factor 1/(1 + ρ W), so a few rounds with growing ρ
+are enough.
 
 References
 ----------
@@ -29,33 +29,36 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.compliance import scale_by_compliance
 from physics.kernels.contact_solver.gauss_seidel import LOCAL_NORMAL_RHO, cone_residual, update_contact_velocities
 
-# ρ in units of a contact's normal mass 1/W_nn: of the first round, its growth from round to round, and the
-# largest, where rounding times ρ is still below the tolerance. Large: fewer rounds, Newton steps that
-# overshoot more often.
+# ρ in units of a contact's normal mass 1/W_nn: in the first round, its growth from round to round, and its largest
+# value, at which rounding times ρ is still below the tolerance. With a larger ρ there are fewer rounds, but Newton
+# steps overshoot more often.
 _PROXIMAL_FACTOR = 1.0e3
 _FACTOR_GROWTH = 10.0
 _FACTOR_LIMIT = 1.0e6
 
-# Rounds; Newton steps of a round, halvings of a step, and steps that did not make the defect smaller, at most.
+# Largest numbers of rounds, of Newton steps of a round, of halvings of a step, and of steps of a round that do not make
+# the defect smaller.
 _MAX_ROUNDS = 12
 _MAX_NEWTON_STEPS = 20
 _MAX_HALVINGS = 6
 _MAX_FAILURES = 5
 
-# Rounds and Newton steps of a quick turn: what has not settled by then profits more from a few sweeps in between than
-# from more steps. A few problems in a thousand used to take two thirds of all steps.
+# Largest numbers of rounds and Newton steps in a quick turn. Problems that are not solved by then profit more from a
+# few sweeps in between than from more steps.
 _QUICK_ROUNDS = 6
 _QUICK_NEWTON_STEPS = 8
 
-# A round is solved to this share of the tolerance.
+# The system of a round is solved to this share of the tolerance.
 _ROUND_TOLERANCE_SHARE = 0.01
 
 
 @inlined
 def _fixed_point_residual(n, factor, inv_mass, scratch):
-    """Write x - M⁻¹ Jᵀ p(x) into `defect`, p(x) into `trial`; return the defect's size as a velocity [m/s].
+    """Compute the defect x - M⁻¹ Jᵀ p(x) of the twist x in `solver.twist`; return its size as a velocity [m/s].
 
-    `contacts.velocity` receives q - ρ u, which the derivative of the law is taken at.
+    p(x) are the impulses of the contact law, projected from q - ρ u(x), with the present impulses q. The defect goes to
+    `solver.defect`, p(x) to `solver.trial`, and q - ρ u to `contacts.velocity`. `factor` is ρ in units of each
+    contact's normal mass.
     """
     body, contacts, solver = scratch.body, scratch.contacts, scratch.solver
     frame, angular, response = contacts.frame, contacts.angular, contacts.response
@@ -85,13 +88,16 @@ def _fixed_point_residual(n, factor, inv_mass, scratch):
 
 @inlined
 def _jacobian_entry(s, c, contacts):
-    """Entry c of row s of J."""
+    """Entry c (0 to 5) of row s of the contact Jacobian J."""
     return contacts.frame[s, c] if c < 3 else contacts.angular[s, c - 3]
 
 
 @inlined
 def _fill_newton_matrix(n, factor, inv_mass, scratch):
-    """Fill the Newton matrix 1 - M⁻¹ Jᵀ p'(u) J after `_fixed_point_residual`, with -defect beside it (6 x 7)."""
+    """Fill `solver.newton` (6 x 7) with the Newton matrix 1 - M⁻¹ Jᵀ p'(u) J, and with -defect in column 6.
+
+    `_fixed_point_residual` must have been called at the present twist.
+    """
     body, contacts, solver = scratch.body, scratch.contacts, scratch.solver
     A, y, frame, response = solver.newton, contacts.velocity, contacts.frame, contacts.response
     for a in range(6):
@@ -126,7 +132,10 @@ def _fill_newton_matrix(n, factor, inv_mass, scratch):
 
 @inlined
 def _eliminate(A):
-    """Solve the 6 x 6 system with its right side in column 6 by elimination; the result is in column 6."""
+    """Solve the 6 x 6 linear system A, with the right-hand side in column 6, by Gauss's elimination.
+
+    The solution is written to column 6; the other columns are overwritten.
+    """
     for k in range(6):
         best = k
         for a in range(k + 1, 6):
@@ -148,7 +157,7 @@ def _eliminate(A):
 
 @inlined
 def _newton_step(n, size, factor, inv_mass, scratch):
-    """Take one damped Newton step on the twist; return the new size of the defect."""
+    """Make one damped Newton step on the twist; return the new size of the defect [m/s], which was `size` before."""
     solver = scratch.solver
     x, start, step = solver.twist, solver.start, solver.newton
     _fill_newton_matrix(n, factor, inv_mass, scratch)
@@ -169,7 +178,7 @@ def _newton_step(n, size, factor, inv_mass, scratch):
 
 @inlined
 def _twist_of_impulses(n, inv_mass, scratch):
-    """Twist x = M⁻¹ Jᵀ p of `contacts.impulse`."""
+    """Write the change of the body's twist by `contacts.impulse`, x = M⁻¹ Jᵀ p, into `solver.twist`."""
     contacts = scratch.contacts
     x, p = scratch.solver.twist, contacts.impulse
     for c in range(6):
@@ -187,19 +196,19 @@ def proximal_newton(n, residual, goal, is_quick, scratch):
     Parameters
     ----------
     n : int
-        Contacts in `scratch`: what `assemble` and `invert_contact_blocks` fill is read; `contacts.impulse` is the start
-        and receives the result, `contacts.velocity` the contact velocities.
+        Number of contacts in `scratch`. `gauss_seidel.assemble_delassus` and `invert_contact_blocks` must have been
+        called. `contacts.impulse` is the start and gets the result, `contacts.velocity` gets the contact velocities.
     residual, goal : float
         Residual of the start, and tolerance [m/s].
     is_quick : bool
-        Whether to give up early: there is another turn.
+        True to give up early, because sweeps and another turn of this method follow.
 
     Returns
     -------
     steps : int
-        Newton steps.
+        Newton steps made.
     residual : float
-        [m/s], measured on the impulses returned: the best met.
+        Residual [m/s] of the resulting impulses, which are the best of all rounds.
     """
     contacts, solver = scratch.contacts, scratch.solver
     p, u, W = contacts.impulse, contacts.velocity, contacts.delassus

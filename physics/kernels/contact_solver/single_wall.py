@@ -1,4 +1,4 @@
-"""Solve the contacts of one wall, up to four, directly: one or two (`two_contacts`), or a face (`sliding_patch`)."""
+"""Solve up to four contacts of one wall directly: one or two (`two_contacts`), or a face (`sliding_patch`)."""
 
 from __future__ import annotations
 
@@ -16,23 +16,25 @@ from physics.kernels.contact_solver.two_contacts import solve_one_contact, solve
 from physics.kernels.half_space.contact_point import wall_axes
 from physics.kernels.math.simd_gather import valid_lanes_mask
 
-# Share of the free speed by which a contact that opened may close while it is sought which others push.
+# Share of the free contact speed by which an open contact may close while the pushing contacts are searched.
 _CLOSING_TOLERANCE = 1.0e-2
 
 
 class WallSolution(NamedTuple):
-    """Impulses of all contacts of one wall, in its stretched frame; those of each contact are in `contacts.impulse`.
+    """Result of the contacts of one wall: sums of their impulses, in the stretched frame of the wall.
+
+    If found, the impulse of each contact is in `contacts.impulse`.
 
     Attributes
     ----------
     found : bool
-        Whether they solve the problem.
+        True if the impulses solve the problem.
     exerted : tuple of 5 floats
-        Sums along the tangents [N s], and moments about normal and tangents [N m s].
+        Sums of the impulses along the tangents [N s], and of their moments about normal and tangents [N m s].
     push : float
         Sum of the normal impulses [N s].
     residual : float
-        [m/s].
+        Residual [m/s].
     scale : float
         Largest free contact speed [m/s].
     """
@@ -46,7 +48,10 @@ class WallSolution(NamedTuple):
 
 @inlined
 def _solve_face(n, friction, body, scratch):
-    """Solve three or four contacts; write `contacts.impulse` if a solution is found."""
+    """Solve the n = 3 or 4 contacts of a face as a patch: a `WallSolution`; if found, `contacts.impulse` is written.
+
+    `friction` is None without friction, and `body` is a `FreeBody`.
+    """
     patch, on = gather_patch(n, body, scratch), valid_lanes_mask(n)
     scale = largest_free_speed(friction, patch, body)
     start, is_mixed = (body.u[1], body.u[2], body.w[0]), False
@@ -72,7 +77,7 @@ def _solve_face(n, friction, body, scratch):
 
 @inlined
 def _store_impulse(i, p, friction, scratch):
-    """Write the impulse of contact i to `contacts.impulse`, along the unit tangents."""
+    """Write the impulse p of contact i, in the stretched frame, to `contacts.impulse`, along the unit tangents."""
     contacts = scratch.contacts
     if friction is None:
         contacts.impulse[i] = p[0]
@@ -83,7 +88,7 @@ def _store_impulse(i, p, friction, scratch):
 
 @inlined
 def _largest_component(friction, b):
-    """Largest component of a contact velocity that impulses can change [m/s]."""
+    """Largest component of a contact velocity b [m/s]; without friction (None) only the normal one counts."""
     if friction is None:
         return abs(b[0])
     return max(abs(b[0]), max(abs(b[1]), abs(b[2])))
@@ -91,7 +96,10 @@ def _largest_component(friction, b):
 
 @inlined
 def _solve_one_or_two(n, friction, body, scratch):
-    """Solve one or two contacts, like `_solve_face`."""
+    """Solve the n = 1 or 2 contacts of a wall: a `WallSolution`; if found, `contacts.impulse` is written.
+
+    `friction` is None without friction, and `body` is a `FreeBody`.
+    """
     first = contact_in_wall_frame(0, body, scratch)
     scale = _largest_component(friction, first.approach)
     if n == 1:
@@ -114,16 +122,16 @@ def _solve_one_or_two(n, friction, body, scratch):
 
 @inlined
 def solve_single_wall(n, friction, wall, R, v, L, scratch):
-    """Try the impulses with which the n contacts of one wall slide, open, or turn about a sticking one.
+    """Try to find impulses with which the n contacts of one wall stick, slide or open.
 
     Parameters
     ----------
     n : int
-        Contacts in `scratch`, four at most: arm, target, slot and impulse (the warm start) are read.
+        Number of contacts in `scratch`, at most four: arm, target, slot and impulse (the warm start) are read.
     friction : True or None
-        None: frictionless, `scratch.body.mu` is 0 and `contacts.impulse` has one number per contact.
+        None: without friction; `scratch.body.mu` is 0, and `contacts.impulse` has one number per contact.
     wall : int
-        The wall.
+        Index of the wall.
     R : tuple of 9 floats
         Principal frame to world.
     v, L : tuples of 3 floats
@@ -132,11 +140,11 @@ def solve_single_wall(n, friction, wall, R, v, L, scratch):
     Returns
     -------
     found : bool
-        Whether `contacts.impulse` was written; `stage.mode` then says what to try first next time.
+        True if a solution was written to `contacts.impulse`; `stage.mode` then tells the method to try first next time.
     v, L : tuples of 3 floats
-        With the contact impulses, when found.
+        Velocity and angular momentum with the contact impulses, if found.
     residual : float
-        Relative to the largest free contact speed.
+        Residual, relative to the largest free contact speed.
     """
     axes, inv_mass, ratio = wall_axes(scratch.scene.walls, wall), 1.0 / scratch.body.mass, friction_ratio(scratch.body)
     K, u, w = motion_in_wall_frame(R, v, L, axes, scratch.body.J)

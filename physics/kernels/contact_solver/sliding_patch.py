@@ -1,39 +1,36 @@
-"""A patch of contacts that slide: their impulses from a few small linear systems, without a Delassus matrix.
+"""Solve a patch of sliding contacts by a few small linear systems, without a Delassus matrix.
 
-A sliding contact has the impulse p_i (n - μ d_i) along the direction d_i = u_t/|u_t| of its own sliding (u_t
-less what is asked of it). Given the directions, "every normal velocity is on target" is linear in the
-normal impulses; given the impulses so are the velocities, and these give new directions. What remains is to
-turn a few unit vectors the right way.
+A patch is three or four contacts of one wall. A sliding contact has the impulse p_i (n - μ d_i), with the direction
+d_i = u_t/|u_t| of its own sliding (u_t less its target). If the directions are given, the normal impulses follow from a
+linear system, by which all normal velocities meet their targets. The impulses give new velocities, and these give new
+directions. So the only unknowns of Newton's method are a few unit vectors.
 
 In the frame (n, a, b) of the wall the normal velocity of a point is affine in its coordinates,
-u_n = v_n + ω_a b - ω_b a. Three contacts that are not on a line therefore fix v_n, ω_a and ω_b beforehand,
-and with them the sum of the normal impulses. Of all normal impulses with the right sum and moments the affine
-ones, p_i = y_0 + y_1 a_i + y_2 b_i about the centroid, have the least norm (a symmetric patch has symmetric
-impulses); y_0 follows from the sum, y_1 and y_2 from ω_a and ω_b (2 x 2). Left over is the planar motion τ =
-(v_a, v_b, ω_n).
+u_n = v_n + ω_a b - ω_b a. So three contacts that are not on a line determine v_n, ω_a and ω_b, and with them the sum
+of the normal impulses, before any impulse is known. Many normal impulses have this sum and the right moments. Those of
+least norm are affine, p_i = y_0 + y_1 a_i + y_2 b_i about the centroid, and symmetric for a symmetric patch. y_0
+follows from the sum, y_1 and y_2 from ω_a and ω_b (2 x 2). The planar motion τ = (v_a, v_b, ω_n) remains unknown.
 
-With the directions of τ the impulses lead to τ + δ(τ); sought is δ = 0. When τ turns a direction, the
-friction of contact i changes across it like a drag of coefficient κ_i = μ p_i / |u_i|: with e_i = n x d_i,
-h_i = (e_i, r_i x e_i),
+With the directions of the planar motion τ, the impulses lead to the planar motion τ + δ(τ); the solution has δ = 0. If
+τ turns a direction, the friction of contact i changes across it, like a drag with the coefficient κ_i = μ p_i / |u_i|.
+With e_i = n x d_i and h_i = (e_i, r_i x e_i),
 
-    δ(τ + Δ) = δ(τ) - (1 + C H) Δ,    H = Σ κ_i h_i h_iᵀ,
+    δ(τ + Δ) = δ(τ) - (1 + C H) Δ,    H = Σ κ_i h_i h_iᵀ.
 
-where C is the planar compliance of the body while y_1 and y_2 go on holding ω_a and ω_b. That is Newton's
-method (the contacts are taken to be equally far from the centre of mass along n here, which is so to a few
-slops). Where the impulses are those of the directions of τ, the velocity across direction i is h_i·δ exactly,
-so the residual is measured, not estimated: |h_i·δ| s/(s + |u|) with s = μ p_i (W_aa + W_bb), no less than the
-natural map of `gauss_seidel`.
+C is the planar compliance of the body, while y_1 and y_2 keep ω_a and ω_b. This is Newton's method. (It takes the
+contacts to be equally far from the centre of mass along n, which is so to a few slops.) If the impulses belong to the
+directions of τ, the velocity across direction i is exactly h_i·δ. So the residual is measured, not estimated:
+|h_i·δ| s/(s + |u|) with s = μ p_i (W_aa + W_bb), which is at least the natural map of `gauss_seidel`.
 
-Where a step would turn a direction right round some contacts stop, or hold: their impulses, not their directions, are
-what is sought then (`primal_dual_friction`).
+If a step would reverse a direction, some contacts stop or stick. Then their impulses are the unknowns instead of their
+directions (`primal_dual_friction`).
 
 A contact that would have to pull opens, the one that pulls most first, or two of four at once (the block tips over an
-edge); the fit of the targets says whether it then separates fast enough. One that would close while the others push
-pushes again, once; where three push and it hardly closes, not before these are solved. Without friction the first
-linear system is the solution.
+edge). An open contact that would close pushes again, once. If three contacts push, and the fourth closes only slowly,
+the three are solved first. Without friction the first linear system is the solution.
 
-All begins with the motion that the impulses of the last step lead to, and with themselves where some contacts held; or,
-where they are of other loads, with `patch_start.cold_start_motion`.
+The solve starts from the planar motion after the impulses of the last step, and from these impulses themselves if some
+contacts stuck. If they belong to other loads, it starts from `patch_start.cold_start_motion`.
 """
 
 from __future__ import annotations
@@ -71,32 +68,33 @@ from physics.kernels.contact_solver.primal_dual_friction import (
 from physics.kernels.contact_solver.two_contacts import solve_two_contacts
 from physics.kernels.math.simd_gather import select_lane, valid_lanes_mask
 
-# Linear solves of one attempt at most. Two are usual at a tolerance of 1e-6, each contact that opens costs
+# Largest number of linear solves of one attempt. Two are usual at a tolerance of 1e-6; each contact that opens needs
 # one more.
 _MAX_PATCH_SOLVES = 16
 
-# What to try first (`stage.mode`): all hold, all slide, or some of both.
+# Method to try first (`stage.mode`): all contacts stick, all slide, or some stick and some slide.
 TRY_STICKING, TRY_SLIDING, TRY_MIXED = range(3)
 
-# What a round comes to, beside `primal_dual_friction.ROUND_FAILED`, `ROUND_SOLVED` and `ROUND_PULLS`.
+# Results of a round of Newton's method, in addition to `primal_dual_friction.ROUND_FAILED`, `ROUND_SOLVED` and
+# `ROUND_PULLS`: it goes on, two of four contacts would pull, or a sliding direction would reverse.
 ROUND_CONTINUES, ROUND_TIPS, ROUND_REVERSES = range(3, 6)
 
 
 class PatchSolution(NamedTuple):
-    """Impulses of a patch.
+    """Impulses of a patch, with their sums and residual.
 
     Attributes
     ----------
     found : bool
-        Whether they solve the problem.
+        True if the impulses solve the problem.
     impulses : tuple of 3 lanes
-        Of each contact (normal, tangents) [N s].
+        Impulses (normal, tangents) of the contacts, one lane each [N s].
     exerted : tuple of 5 floats
-        Their sums along the tangents [N s], and moments [N m s].
+        Sums of the impulses along the tangents [N s], and of their moments about (n, a, b) [N m s].
     push : float
         Sum of the normal impulses [N s].
     residual : float
-        [m/s].
+        Residual [m/s].
     """
 
     found: bool
@@ -107,12 +105,12 @@ class PatchSolution(NamedTuple):
 
 
 class PushingContacts(NamedTuple):
-    """Contacts of a patch that push.
+    """Choice of the contacts of a patch that push; the others are open.
 
     Attributes
     ----------
     count : int
-        Number of them.
+        Number of pushing contacts.
     on : lanes
         1 for each of them, 0 for an open contact.
     is_back : lanes
@@ -125,17 +123,18 @@ class PushingContacts(NamedTuple):
 
 
 class NormalChoice(NamedTuple):
-    """Normal motion chosen for the contacts that push.
+    """Normal motion (v_n, ω_a, ω_b) of the body that is chosen for the pushing contacts of a patch.
 
     Attributes
     ----------
     ok : bool
-        Whether it meets their targets, and no open contact closes faster than `PatchProblem.loose`.
+        True if it meets the targets of the pushing contacts, and no open contact closes faster than
+        `PatchProblem.loose`.
     closing : int
-        The open contact that closes fastest, by more than the goal, or -1.
+        The open contact that closes fastest, if faster than `PatchProblem.goal`; else -1.
     is_even : bool
-        Whether it meets the targets of four contacts within the goal. Then it does whichever of them push; three that
-        met theirs to the letter would have the fourth off by four times as much, and it would push again for nothing.
+        True if it meets the targets of all four contacts within the goal. Then it is kept, whichever contacts push. A
+        new fit to three contacts could make the fourth close by a multiple of the goal, and push again needlessly.
     motion : tuple of 3 floats
         (v_n, ω_a, ω_b) [m/s, rad/s].
     """
@@ -148,17 +147,19 @@ class NormalChoice(NamedTuple):
 
 @inlined
 def _fit_pushing_contacts(pushing, problem):
-    """Choose the contacts that push, and their normal motion.
+    """Fit a normal motion of the body to the targets of the pushing contacts; if four do not fit, one of them opens.
 
-    Four targets may belong to no rigid motion. Then three contacts meet their targets, and one opens that is then
-    faster than its target. A rectangle has two such choices; the contact that approaches less opens.
+    Four targets may belong to no rigid motion. Then three contacts meet their targets, and the fourth separates faster
+    than its target. A rectangle has two contacts for which this is so; the one that approaches less opens.
 
     Returns
     -------
     PushingContacts
+        The contacts that push, one less than before if one has opened.
     center : tuple of 3 floats
         Their centroid [m].
     NormalChoice
+        The normal motion.
     """
     patch, goal, u, w = problem.patch, problem.goal, problem.body.u, problem.body.w
     count, on, is_back = pushing
@@ -178,7 +179,10 @@ def _fit_pushing_contacts(pushing, problem):
 
 @inlined
 def _choose_normal_motion(pushing, choice, problem):
-    """Choose the normal motion as `_fit_pushing_contacts`; an even choice stays, about the new centroid."""
+    """Choose the normal motion of the pushing contacts by `_fit_pushing_contacts`; return the same three results.
+
+    A `choice` that is even is kept; only the centroid is computed anew.
+    """
     if choice.is_even:
         return pushing, patch_centroid(pushing.count, problem.patch, pushing.on), choice
     return _fit_pushing_contacts(pushing, problem)
@@ -186,13 +190,14 @@ def _choose_normal_motion(pushing, choice, problem):
 
 @inlined
 def _solve_remaining_pair(on, problem, scratch):
-    """Solve the two contacts that still push, with the others open.
+    """Solve a patch of which only two contacts, those with `on` = 1, still push.
 
     Returns
     -------
     PatchSolution
+        The solution with the other contacts open.
     closing : int
-        The open contact that would close fastest, where that is why it is not found, else -1.
+        If the solution is not found because an open contact would close, the contact that closes fastest; else -1.
     """
     patch, body, goal = problem.patch, problem.body, problem.goal
     _, a, b = patch.points
@@ -219,14 +224,14 @@ def _solve_remaining_pair(on, problem, scratch):
 
 @inlined
 def _direction_newton_round(patient, pushing, problem, normal, motion, scratch):
-    """Take one round of Newton's method on the directions of `motion`.
+    """Make one round of Newton's method on the sliding directions of the planar motion `motion`.
 
     Returns
     -------
     PatchRound
-        `ROUND_SOLVED`; `ROUND_CONTINUES`; `ROUND_PULLS`; `ROUND_TIPS`: two of four contacts would pull; or
-        `ROUND_REVERSES`: a direction would turn right round. Its x, y and motion are then those after the first step
-        of `primal_dual_friction`.
+        Its `what` is `ROUND_SOLVED`; `ROUND_CONTINUES`; `ROUND_PULLS`; `ROUND_TIPS`, if two of four contacts would
+        pull; or `ROUND_REVERSES`, if a direction would reverse. In the last case its x, y and motion are those after
+        the first step of `primal_dual_friction`.
     pulling : lanes
         1 for a contact that would have to pull, else 0.
     """
@@ -258,7 +263,7 @@ def _direction_newton_round(patient, pushing, problem, normal, motion, scratch):
 
 @inlined
 def _push_again(contact, pushing):
-    """Let an open contact push once more."""
+    """Add the open contact number `contact` to the `PushingContacts`, and mark that it was open before."""
     is_it = select_lane(contact)
     return PushingContacts(
         pushing.count + 1, select_lanes(is_it, 1.0, pushing.on), select_lanes(is_it, 1.0, pushing.is_back)
@@ -267,7 +272,10 @@ def _push_again(contact, pushing):
 
 @inlined
 def _open_pulling(current, pulling, pushing):
-    """Open the contact that would pull most, or two contacts of a tipping face."""
+    """Remove contacts that would pull from the `PushingContacts`, after the `PatchRound` `current`.
+
+    It is the contact that would pull most, or the two pulling contacts of a tipping face.
+    """
     count, on, is_back = pushing
     if current.what == ROUND_TIPS:
         return PushingContacts(2, on - pulling, is_back)
@@ -276,15 +284,18 @@ def _open_pulling(current, pulling, pushing):
 
 @inlined
 def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, scratch):
-    """Take one round on the directions; where they do not settle, take all rounds of `primal_dual_friction`.
+    """Make one round of Newton's method on sliding directions; if one would reverse, solve by `primal_dual_friction`.
+
+    If `is_mixed`, some contacts stuck in the last stage, and `primal_dual_friction` starts at once.
 
     Returns
     -------
     PatchRound
+        Result of the last method.
     pulling : lanes
-        As `_direction_newton_round`.
+        That of `_direction_newton_round`.
     mode : int
-        `TRY_SLIDING` or `TRY_MIXED`: which of the two methods had the last word.
+        Last method: `TRY_SLIDING` for Newton's method on directions, `TRY_MIXED` for `primal_dual_friction`.
     """
     none = Lanes(0.0, 0.0, 0.0, 0.0)
     if is_mixed:
@@ -301,27 +312,28 @@ def _solve_round(n, patient, is_mixed, pushing, problem, normal, motion, scratch
 
 @inlined
 def solve_sliding_patch(n, patient, problem, start, is_mixed, scratch):
-    """Find the directions, and the contacts that push.
+    """Solve the contact problem of a patch: which contacts push, in which directions they slide, and which stick.
 
     Parameters
     ----------
     n : int
-        Contacts, 3 or 4.
+        Number of contacts, 3 or 4.
     patient : bool
-        Whether a contact that pulls may push again while directions still turn. Otherwise it opens at once, which
-        is quick and nearly always right.
+        True: a contact that would pull stays among the pushing ones while directions still turn. False: it opens at
+        once, which is quick and nearly always right.
     problem : PatchProblem
+        The contact problem.
     start : tuple of 3 floats
-        Planar motion to start from.
+        Planar motion (v_a, v_b, ω_n) to start from.
     is_mixed : bool
-        Whether some contacts held in the stage before: then its impulses in `scratch` are the start.
+        True if some contacts stuck in the last stage. Then the impulses in `scratch` are the start.
 
     Returns
     -------
     PatchSolution
-        When it is found by a round, `stage.mode` says by which method.
+        The impulses. If a round has found them, `stage.mode` is set to its method.
     has_opened : bool
-        Whether a contact was opened since it pulled: else patience changes nothing.
+        True if a contact was opened because it would pull. Otherwise `patient` makes no difference.
     """
     none, has_opened = Lanes(0.0, 0.0, 0.0, 0.0), False
     pushing, choice = PushingContacts(n, valid_lanes_mask(n), none), NormalChoice(False, -1, False, start)

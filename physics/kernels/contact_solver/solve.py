@@ -1,4 +1,7 @@
-"""One contact problem: directly, else by sweeps and Newton, else by pivoting; with its residual."""
+"""Solve the contact problem of one body: directly, else by sweeps and Newton's method, else by pivoting.
+
+See the package docstring for the problem and the order of the solvers.
+"""
 
 from __future__ import annotations
 
@@ -25,33 +28,32 @@ from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING, METHOD_SWEEPS
 
-# The pyramid's octagon is off by up to 1 - cos(π/8) = 8 % of the friction. Sweeps that stall nearer to a
-# solution than this share of the largest free contact speed know it better: their residual is reported as it
-# is.
+# Pivoting is tried only for residuals above this share of the largest free contact speed. The pyramid's octagon is
+# wrong by up to 1 - cos(π/8) = 8 % of the friction, so a smaller residual of sweeps is more exact.
 _PIVOTING_THRESHOLD = 0.01
 
-# Residual that rounding leaves, relative to the largest free contact speed: the smallest tolerance.
+# Residual by rounding, relative to the largest free contact speed: the smallest tolerance.
 _ROUNDING = 1.0e-12
 
-# Sweeps before Newton's method has a turn: most problems that are left for sweeps need fewer than ten.
+# Sweeps before each turn of Newton's method: most problems that are left for sweeps need fewer than ten.
 _SWEEPS_PER_ROUND = 12
 
-# Turns of Newton's method that end early, unless there is no other; what they leave it is given its time for.
+# The first turns of Newton's method end early if it does not converge soon; later turns, and the last one, do not.
 _QUICK_NEWTON_ROUNDS = 10
 
-# Pivots of the fallback at most: several times the unknowns of a dozen contacts.
+# Largest number of pivots of the fallback: several times the unknowns of a dozen contacts.
 MAX_PIVOTS = 500
 
 
 @if_given("contact.friction", 1)
 def rows_per_contact(contact):
-    """Number of unknowns of a contact: the normal impulse, and with friction two more."""
+    """Number of unknown impulses of a contact: 1 without friction, 3 with it; `contact` is a `ContactSwitches`."""
     return 3
 
 
 @inlined
 def _largest_free_speed(rows, bias):
-    """Largest free contact speed [m/s]: the scale of the relative residual."""
+    """Largest size of the first `rows` free contact velocities `bias` [m/s]: the scale of the relative residual."""
     largest = 0.0
     for r in range(rows):
         largest = max(largest, abs(bias[r]))
@@ -59,7 +61,7 @@ def _largest_free_speed(rows, bias):
 
 
 def _pivot_normals(n, contact, scratch):
-    """Pivoting without friction; the residual [m/s]."""
+    """Solve the assembled contact problem without friction by pivoting; return its residual [m/s]."""
     contacts = scratch.contacts
     p, W, b, u = contacts.impulse, contacts.delassus, contacts.bias, contacts.velocity
     solve_normal_lcp(W, b, n, p, scratch.solver.fallback_float, scratch.solver.fallback_int, MAX_PIVOTS)
@@ -69,7 +71,7 @@ def _pivot_normals(n, contact, scratch):
 
 @if_given("contact.friction", _pivot_normals)
 def _pivot(n, contact, scratch):
-    """Pivoting with the friction pyramid; the residual against the cone [m/s]."""
+    """Solve the assembled contact problem by pivoting, with a friction pyramid; return the friction cone's residual."""
     contacts, solver = scratch.contacts, scratch.solver
     p, W, b, u = contacts.impulse, contacts.delassus, contacts.bias, contacts.velocity
     solve_pyramid_lcp(W, b, contacts.friction, n, p, solver.fallback_float, solver.fallback_int, MAX_PIVOTS)
@@ -79,7 +81,10 @@ def _pivot(n, contact, scratch):
 
 @kernel
 def _solve_by_pivoting(n, contact, residual, scratch):
-    """Solve by pivoting, and keep the result if it beats that of the sweeps. Returns the residual [m/s]."""
+    """Solve by pivoting, and keep the impulses if their residual is below `residual`, that of the sweeps.
+
+    Returns the residual of the impulses that are kept [m/s].
+    """
     rows = n * rows_per_contact(contact)
     for r in range(rows):
         scratch.solver.saved[r] = scratch.contacts.impulse[r]
@@ -97,7 +102,7 @@ def _keep_sweeps(n, contact, limit, residual, scratch):
 
 @if_given("contact.pivots", _keep_sweeps)
 def _pivot_above(n, contact, limit, residual, scratch):
-    """Solve by pivoting where sweeps left more than `limit` [m/s]: (residual, method)."""
+    """Solve by pivoting if the residual of the sweeps is above `limit` [m/s]: (residual [m/s], method)."""
     if residual <= limit:
         return residual, METHOD_SWEEPS
     return _solve_by_pivoting(n, contact, residual, scratch), METHOD_PIVOTING
@@ -105,7 +110,7 @@ def _pivot_above(n, contact, limit, residual, scratch):
 
 @inlined
 def _apply_impulses(n, width, v, L, scratch):
-    """Velocity and angular momentum after the impulses: v + Σ P/m, L + Σ r x P."""
+    """Velocity v + Σ P/m and angular momentum L + Σ r x P after the impulses of n contacts, `width` numbers each."""
     contacts = scratch.contacts
     walls = scratch.scene.walls
     inv_mass = 1.0 / scratch.body.mass
@@ -129,20 +134,20 @@ def _apply_impulses(n, width, v, L, scratch):
 
 @kernel
 def _solve_sticking(n, R, v, L, scratch):
-    """Call `solve_all_sticking`, in a function of its own, since its place varies and it is compiled once."""
+    """Call `solve_all_sticking`, as a kernel that is compiled once for the two calls in `_solve_directly`."""
     return solve_all_sticking(n, R, v, L, scratch)
 
 
 @shared_kernel
 def _solve_directly(n, friction, R, v, L, scratch):
-    """Try all contacts sticking, and all sliding, the likelier first: (found, v, L, residual).
+    """Try the direct solvers `solve_all_sticking` and `solve_single_wall`: (found, v, L, residual).
 
-    `sliding_patch` solves any single contact. An edge, or contacts of several walls, begin with the attempt that
-    succeeded last. Springs never stick, nor is their normal motion known beforehand; one or two of them go to
-    `sliding_patch`.
+    The one that is more likely to succeed comes first. For a single contact this is `solve_single_wall`. For three or
+    four contacts of one wall `may_stick` decides. For two contacts, and for contacts of several walls, it is the
+    one that succeeded last. Compliant contacts never stick; one or two of them go to `solve_single_wall`.
 
-    The attempts are written without a loop. LLVM would compute, before a loop, numbers that only one attempt needs,
-    whether that is made or not.
+    The attempts are written without a loop: before a loop LLVM would compute numbers that only one attempt needs, even
+    if this attempt is not made.
     """
     scene, stage = scratch.scene, scratch.stage
     wall, is_soft = wall_of(scratch.contacts.slot[0], scene), contact_stiffness(scratch.body) > 0.0
@@ -168,7 +173,7 @@ def _solve_directly(n, friction, R, v, L, scratch):
 
 @inlined
 def _assemble_problem(n, width, R, v, L, scratch):
-    """Assemble the contact problem; return the largest free contact speed."""
+    """Assemble the contact problem of n contacts in `scratch.contacts`; return the largest free contact speed [m/s]."""
     J = scratch.body.J
     mb = qt.transposed_matvec(R, L)
     assemble_delassus(n, width, R, v, qt.matvec(R, (J[0] * mb[0], J[1] * mb[1], J[2] * mb[2])), scratch)
@@ -178,10 +183,10 @@ def _assemble_problem(n, width, R, v, L, scratch):
 
 
 def _sweep_normals(n, contact, goal, scratch):
-    """Sweeps without friction: (sweeps, residual [m/s])."""
+    """Solve the assembled problem without friction by sweeps, to the residual `goal` [m/s]: (sweeps, residual)."""
     contacts = scratch.contacts
     if contact_stiffness(scratch.body) > 0.0:
-        # W is positive definite, but sweeps crawl where γ is small: a few pivots first.
+        # W is positive definite, but sweeps converge slowly if the compliance γ is small: a few pivots first.
         floats, index = scratch.solver.fallback_float, scratch.solver.fallback_int
         solve_normal_lcp(contacts.delassus, contacts.bias, n, contacts.impulse, floats, index, MAX_PIVOTS)
     return normal_sweeps(n, goal, scratch.settings.sweeps, contacts)
@@ -189,14 +194,17 @@ def _sweep_normals(n, contact, goal, scratch):
 
 @if_given("contact.friction", _sweep_normals)
 def _sweep_and_newton(n, contact, goal, scratch):
-    """Alternate sweeps with Newton's method: (sweeps and steps, residual [m/s])."""
+    """Solve the assembled problem with friction by sweeps and Newton's method in turn, to the residual `goal` [m/s].
+
+    Returns (sweeps and Newton steps, residual [m/s]).
+    """
     steps, residual = 0, 0.0
     invert_contact_blocks(n, scratch)
     for i in range(n):
         scratch.contacts.friction[i] = scratch.body.mu
     left, at_once, turns = scratch.settings.sweeps, _SWEEPS_PER_ROUND, 0
     if contact_stiffness(scratch.body) > 0.0:
-        # The normals are determined, and Newton's method shares tangents out evenly.
+        # Newton's method first: it distributes tangential impulses evenly, and normal impulses are unique here.
         at_once = 0
     while True:
         sweeps, residual = cone_sweeps(n, scratch.contacts.friction, goal, min(left, at_once), scratch)
@@ -216,7 +224,10 @@ def _sweep_and_newton(n, contact, goal, scratch):
 
 @shared_kernel
 def _solve_iteratively(n, contact, v, L, R, scratch):
-    """Solve as `solve_contacts` by sweeps and later solvers; not inlined, since few problems come to it."""
+    """Solve the contact problem by sweeps, Newton's method and pivoting; arguments and result of `solve_contacts`.
+
+    It is not inlined, since few problems need it.
+    """
     width = rows_per_contact(contact)
     scale = _assemble_problem(n, width, R, v, L, scratch)
     goal = max(min(scratch.settings.tolerance * scale, scratch.stage.residual_limit), _ROUNDING * scale)
@@ -231,18 +242,18 @@ def _solve_iteratively(n, contact, v, L, R, scratch):
 
 @kernel
 def solve_contacts(n, contact, v, L, R, scratch):
-    """Contact impulses that bring the contacts of `scratch` to their target velocities as far as they can.
+    """Solve the contact problem of n contacts in `scratch`: impulses that bring them to their targets, within friction.
 
-    Tried in this order: `solve_all_sticking` and `solve_single_wall`, directly, the likelier one first; sweeps in turn
-    with Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
+    Solvers are tried in this order: the direct ones `solve_all_sticking` and `solve_single_wall`; sweeps in turn with
+    Newton's method; pivoting. The first whose residual is within the tolerance gives the result.
 
     Parameters
     ----------
     n : int
-        Contacts in `scratch`, one at least: slot, arm, target are read, impulse (width * n, the warm start)
-        overwritten.
+        Number of contacts in `scratch.contacts`, one at least. Their slot, arm and target are read. Their impulses are
+        the warm start, and are overwritten by the solution.
     contact : ContactSwitches
-        Without friction one row per contact; without pivots no pivoting fallback.
+        Without friction there is one row per contact; without pivots there is no pivoting fallback.
     v, L : tuples of 3 floats
         Velocity [m/s] and angular momentum [kg m²/s] without contact impulses.
     R : tuple of 9 floats
@@ -251,12 +262,13 @@ def solve_contacts(n, contact, v, L, R, scratch):
     Returns
     -------
     v, L : tuples of 3 floats
-        After the impulses.
+        Velocity and angular momentum after the impulses.
     residual : float
-        Relative to the largest free contact speed.
+        Residual, relative to the largest free contact speed.
     sweeps : int
+        Sweeps and Newton steps made.
     method : int
-        METHOD_DIRECT, METHOD_SWEEPS or METHOD_PIVOTING.
+        METHOD_DIRECT, METHOD_SWEEPS or METHOD_PIVOTING, the last one tried.
     """
     found, v_new, L_new, residual = _solve_directly(n, contact.friction, R, v, L, scratch)
     if found:

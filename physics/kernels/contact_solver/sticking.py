@@ -1,29 +1,29 @@
-"""Contacts that all stick: impulses of a patch, an edge or a point without a sweep.
+"""Solve contacts that all stick: the impulses of a patch, an edge or a point, directly.
 
-When every contact keeps the velocity asked of it (nothing slides, nothing lifts off) the twist after the
-solve is known before the impulses are, up to what the contacts do not fix:
+If all contacts move at their target velocities (none slides, none lifts off), the twist of the body after the solve is
+known before the impulses are, except for the part that the contacts leave free:
 
-- three points that are not on a line fix all of it;
-- points on a line leave the rotation ω·e about it, whose angular momentum no impulse on the line can change;
-- one point leaves every rotation about it: the impulse is W⁻¹ (t - u), W the 3x3 inverse mass at the point.
+- three points that are not on a line determine the whole twist;
+- points on a line with the direction e leave the rotation ω·e; no impulse on the line changes its angular momentum;
+- one point leaves every rotation about it. Its impulse is W⁻¹ (t - u), with the target t, the velocity u, and the 3x3
+  inverse mass W at the point.
 
-Of the impulses that produce the twist the one of least norm is the bolt-group formula: with n contact points
-at r_i, centroid r̄, d_i = r_i - r̄ and second moment K = Σ (|d_i|² 1 - d_i d_iᵀ),
+Many sets of impulses give this twist. Those of least norm are given by the bolt-group formula. With n contact points at
+r_i, their centroid r̄, d_i = r_i - r̄ and the second moment K = Σ (|d_i|² 1 - d_i d_iᵀ),
 
     p_i = F / n + (K⁻¹ T) x d_i,
 
-F the total impulse and T its moment about the centroid (K⁻¹ is 1/Σ|d_i|² on a line, 0 at a point). A body at
-rest gets velocity zero, to the last bit, and a symmetric patch symmetric impulses. Where this one leaves a
-cone although every contact pushes, the tangential impulses are shared out in the proportion of the normal
-ones instead, the same formula with the weights p_n: a lightly loaded contact then has a small target. A
-contact that would have to pull is left out, the one that pulls most first. If each p_i lies in its friction
-cone at the end, this solves the contact problem exactly; otherwise the contacts slide (`sliding_patch`,
-`gauss_seidel`).
+where F is the total impulse and T its moment about the centroid. (On a line 1/Σ|d_i|² takes the place of K⁻¹, at a
+point 0.) A body at rest gets zero velocity, to the last bit, and a symmetric patch gets symmetric impulses. If some
+impulses leave their friction cones although every contact pushes, the tangential impulses are distributed in proportion
+to the normal ones instead: the same formula with the weights p_n. A contact that would have to pull opens, the one that
+pulls most first. If each p_i is in its friction cone at the end, the contact problem is solved exactly. Otherwise some
+contacts slide (`sliding_patch`, `gauss_seidel`).
 
-Targets of contacts that hold need not be those of a rigid motion: `target_velocity.set_resting_targets` moves points of
-a turning body apart, by nanometres a step when it is about to hold. Met exactly, all of them would slide, and friction
-would be spent on that. They are replaced by those of the twist that fits them best where that changes them by less
-than `stage.target_error_limit`.
+The targets of sticking contacts need not belong to a rigid motion: `target_velocity.set_resting_targets` moves points
+of a turning body apart, by nanometres a step when the body is about to stop. If such targets were met exactly, all
+contacts would slide, and friction would be spent on this. So the targets are replaced by those of the twist that fits
+them best, if this changes them by less than `stage.target_error_limit`.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus
 from physics.kernels.state.layout import WALL_NORMAL, WALL_TANGENT_1, WALL_TANGENT_2
 
-# det K / tr(K)³ of a patch is (1 - s) s / 8 for a rectangle, s the smaller share of its second moment. Below
-# 1e-6 (edges 1 : 350) the patch counts as a line and is left to the sweeps.
+# For a rectangular patch det K / tr(K)³ is (1 - s) s / 8, with s the smaller share of its second moment. Below this
+# limit (edges 1 : 350) the patch counts as a line.
 _COLLINEAR_LIMIT = 1.0e-6
 
-# The target velocities must be those of one rigid twist, to this share of the largest of them
-# (rounding of a least-squares fit over a patch that is not a line).
+# Errors of the target velocities up to this share of the largest target are rounding (of a least-squares fit over a
+# patch that is not a line).
 _RIGID_TWIST_TOLERANCE = 1.0e-11
 
 
@@ -73,18 +73,18 @@ class FreeMotion(NamedTuple):
 
 
 class BoltGroup(NamedTuple):
-    """Sticking contacts, flagged in `solver.active`, world frame.
+    """Centroid and second moment of the contacts that are to stick, those with a flag in `solver.active`; world frame.
 
     Attributes
     ----------
     count : int
-        Number of them.
+        Number of these contacts.
     center : tuple of 3 floats
         Their centroid r̄, from the centre of mass [m].
     second : tuple of 6 floats
         Their second moment K (00, 01, 02, 11, 12, 22) about the centroid [m²].
     is_line : bool
-        Whether they are on a line, or at a point.
+        True if they are on a line, or at a point.
     """
 
     count: int
@@ -95,7 +95,7 @@ class BoltGroup(NamedTuple):
 
 @inlined
 def _bolt_group(n, count, scratch):
-    """The `BoltGroup` of the active contacts."""
+    """Make the `BoltGroup` of the active contacts, `count` of the n contacts in `scratch`."""
     contacts = scratch.contacts
     cx = cy = cz = 0.0
     for i in range(n):
@@ -128,7 +128,7 @@ def _is_collinear(k):
 
 @inlined
 def _world_target(i, scratch):
-    """Target velocity of contact i in the world frame."""
+    """Target velocity of contact i in the world frame [m/s]."""
     contacts = scratch.contacts
     n, a, b = contacts.target[i, 0], contacts.target[i, 1], contacts.target[i, 2]
     walls, wall = scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene)
@@ -150,7 +150,7 @@ def _largest_target_speed(n, contacts):
 
 @inlined
 def _target_moments(n, group, scratch):
-    """Mean of the target velocities, and Σ d_i x t_i."""
+    """Mean of the target velocities t_i of the active contacts [m/s], and Σ d_i x t_i, d_i from their centroid."""
     count, c = group.count, group.center
     s = (0.0, 0.0, 0.0)
     m = (0.0, 0.0, 0.0)
@@ -166,9 +166,9 @@ def _target_moments(n, group, scratch):
 
 @inlined
 def _target_residual(n, v, w, scratch):
-    """Largest distance of contact velocities from their targets.
+    """Largest error of the contact velocities at the twist (v, w), relative to their targets [m/s].
 
-    A contact without impulse may separate faster than asked.
+    For a contact without impulse only a normal velocity below the target is an error, since it may separate.
     """
     walls = scratch.scene.walls
     worst = 0.0
@@ -187,10 +187,12 @@ def _target_residual(n, v, w, scratch):
 
 @inlined
 def _angular_velocity_about_line(n, group, vc, m, free, scratch):
-    """Angular velocity of a body held at points on a line.
+    """Angular velocity of a body whose active contacts, on a line, move at their targets, world frame [rad/s].
 
-    Across the line it is the least-squares fit Σ d x t / Σ|d|². Along the unit vector e it is α with
-    e·(I ω - L - c x m (v₁ - v)) = 0, v₁ = v_c - ω x c: the contacts exert no moment about the line.
+    vc is the mean of the target velocities t and `m` is Σ d x t, both of `_target_moments`. Across the line the angular
+    velocity is the least-squares fit Σ d x t / Σ|d|². Along the line's unit vector e it is α, from the condition that
+    the contacts exert no moment about the line: e·(I ω - L - c x M (v₁ - v)) = 0, with the mass M, the centroid c, and
+    v₁ = vc - ω x c.
     """
     body = scratch.body
     J, c, k, (R, v, L) = body.J, group.center, group.second, free
@@ -212,7 +214,10 @@ def _angular_velocity_about_line(n, group, vc, m, free, scratch):
 
 @inlined
 def _point_impulse(r, t, free, body):
-    """Impulse at r that gives the point the velocity t, by its inverse mass in the principal frame."""
+    """Impulse at the point r, from the centre of mass, that gives this point the velocity t, world frame [N s].
+
+    `free` is the motion without the impulse.
+    """
     J, q, (R, v, L) = body.J, 1.0 / body.mass, free
     x, y, z = qt.transposed_matvec(R, r)
     Lb = qt.transposed_matvec(R, L)
@@ -229,7 +234,10 @@ def _point_impulse(r, t, free, body):
 
 @inlined
 def _sticking_twist(n, group, no_target, free, scratch):
-    """Velocity and angular velocity of the body with the active contacts on their targets."""
+    """Velocity and angular velocity of the body whose active contacts move at their targets, world frame.
+
+    `no_target` is true if all targets are zero.
+    """
     zero = (0.0, 0.0, 0.0)
     if no_target and not group.is_line:
         return zero, zero
@@ -250,7 +258,7 @@ def _sticking_twist(n, group, no_target, free, scratch):
 
 @inlined
 def _solve_bolt_group(group, T):
-    """K⁻¹ T of the bolt group: 2 T / tr K on a line, 0 at a point."""
+    """Vector K⁻¹ T of the bolt-group formula for the moment T [N s/m]: 2 T / tr K on a line, 0 at a point."""
     k = group.second
     if group.count == 1:
         return (0.0, 0.0, 0.0)
@@ -262,10 +270,10 @@ def _solve_bolt_group(group, T):
 
 @inlined
 def _restore_moment(n, group, T, scratch):
-    """Restore the moment T of the impulses of `distribute_by_load`; True if they stay in their cones.
+    """Correct the impulses of `distribute_by_load`, so that their moment is T; return whether all stay in their cones.
 
-    `distribute_by_load` assumes that all contacts are equally deep in the wall, which holds to a few slops. The missing
-    moment ΔT makes one more bolt group, (K⁻¹ ΔT) x d_i.
+    `distribute_by_load` takes all contacts to be equally far from the centre of mass along the normal, which is so to a
+    few slops. The missing moment ΔT adds the impulses (K⁻¹ ΔT) x d_i of the bolt-group formula.
     """
     scene, contacts, solver = scratch.scene, scratch.contacts, scratch.solver
     walls, c = scene.walls, group.center
@@ -295,7 +303,7 @@ def _restore_moment(n, group, T, scratch):
 
 @inlined
 def _largest_free_speed(n, free, scratch):
-    """Largest contact velocity without impulses, relative to the target [m/s]: the scale of a residual."""
+    """Largest component of contact velocities without impulses, less their targets [m/s]: the scale of a residual."""
     J, (R, v, L) = scratch.body.J, free
     b = qt.transposed_matvec(R, L)
     w = qt.matvec(R, (J[0] * b[0], J[1] * b[1], J[2] * b[2]))
@@ -309,12 +317,12 @@ def _largest_free_speed(n, free, scratch):
 
 @inlined
 def solve_all_sticking(n, R, v, L, scratch):
-    """Try the impulses with which all n contacts move at their target velocities.
+    """Try to find impulses with which all n contacts move at their target velocities, or open.
 
     Parameters
     ----------
     n : int
-        Contacts in `scratch` (arm, target and slot are read; impulse is written when it succeeds).
+        Number of contacts in `scratch`: arm, target and slot are read; impulse is written if found.
     R : tuple of 9 floats
         Principal frame to world.
     v, L : tuple of 3 floats
@@ -323,9 +331,11 @@ def solve_all_sticking(n, R, v, L, scratch):
     Returns
     -------
     found : bool
-        False: some contact would have to pull or to slide. `contacts.impulse` is then as it was.
+        False if there are no such impulses. `contacts.impulse` is then unchanged.
     v, L : tuple of 3 floats
-        With the contact impulses, when found.
+        Velocity and angular momentum with the contact impulses, if found.
+    residual : float
+        Largest error of the velocities, relative to the largest free contact speed; 0 within the allowed errors.
     """
     contacts, solver = scratch.contacts, scratch.solver
     J, mass, free = scratch.body.J, scratch.body.mass, FreeMotion(R, v, L)

@@ -1,12 +1,13 @@
-"""One or two contacts of one wall: every mixture of holding, sliding and opening, without a Delassus matrix.
+"""Solve one or two contacts of one wall in every mixture of sticking, sliding and opening, without a Delassus matrix.
 
-Two contacts that slide are two angles. For given directions "both normal velocities are on target" is a
-2 x 2 system for the normal impulses, and Newton's method turns both directions at once until no velocity is left
-across them (`one_contact` has the same for a single contact).
+Two sliding contacts have two unknown directions. For given directions the normal impulses follow from a 2 x 2 system,
+by which both normal velocities meet their targets. Newton's method turns both directions at once, until no velocity is
+left across them. (`one_contact` does the same for a single contact.)
 
-A direction that would turn right round belongs to a contact that sticks. Its impulse answers the other's, p_i = -W_ii⁻¹
-(b_i + W_ij p_j). So the other one is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij. If the cone does not
-allow p_i, contact i slides against it, which gives the next direction to start from.
+A contact whose direction would reverse sticks instead. Its impulse responds to that of the other contact,
+p_i = -W_ii⁻¹ (b_i + W_ij p_j). So the other contact is a single contact with the block W_jj - W_ji W_ii⁻¹ W_ij. If p_i
+is outside its friction cone, contact i slides, opposite to the tangential part of p_i; the search goes on with this
+direction.
 """
 
 from __future__ import annotations
@@ -39,14 +40,14 @@ from physics.kernels.contact_solver.one_contact import (
 )
 from physics.kernels.math import quaternion as qt
 
-# Newton steps at most. Two are usual at a tolerance of 1e-6.
+# Largest number of Newton steps. Two are usual at a tolerance of 1e-6.
 _MAX_NEWTON_STEPS = 12
 
-# How often a contact is tried as one that holds, and both once more after one that was open has closed.
+# Largest number of trials with a sticking contact, and of new trials with both contacts after an open one has closed.
 _MAX_STICK_TRIALS = 2
 _MAX_RECLOSURES = 1
 
-# How often contacts that none of that is true of answer each other in turn, and how many times each.
+# If all these trials fail, the contacts are solved in turn: largest number of such attempts, and sweeps of each.
 _MAX_ALTERNATIONS = 2
 _SWEEPS_PER_ALTERNATION = 8
 
@@ -58,7 +59,10 @@ def _plus(p, q):
 
 @kernel
 def _solve_with_open(pair, direction):
-    """Try the first contact alone, sliding in a `direction` at first, with the second one open."""
+    """Try to solve a `PairProblem` with the second contact open: the `PairTrial` of the first contact alone.
+
+    `direction` is a first guess of the friction -μ d of the first contact.
+    """
     Wi, bi, mu, goal = pair.W11, pair.b1, pair.mu, pair.goal
     x, y = direction
     what, p, miss = solve_contact_block(Wi, bi, mu, Wi[4] + Wi[8], goal, x, y, True)
@@ -73,7 +77,10 @@ def _solve_with_open(pair, direction):
 
 @kernel
 def _solve_with_sticking(pair, direction):
-    """Try the first contact sticking, and the second one sliding, in a `direction` at first, or open."""
+    """Try to solve a `PairProblem` with the first contact sticking, and the second one sliding or open: a `PairTrial`.
+
+    `direction` is a first guess of the friction -μ d of the second contact.
+    """
     Wi, Wij, Wj, bi, bj, mu, goal = pair
     Wji = transpose_block(Wij)
     x, y = direction
@@ -104,7 +111,10 @@ def _solve_with_sticking(pair, direction):
 
 @inlined
 def _solve_both_sliding(pair, first, second):
-    """Make the `SlidingPair` of two directions."""
+    """Solve a `PairProblem` for the normal impulses of two contacts that slide in given directions: a `SlidingPair`.
+
+    `first` and `second` are their frictions -μ d per normal impulse, with the directions d of sliding.
+    """
     W11, W12, W22, b1, b2, mu, _ = pair
     (x1, y1), (x2, y2) = first, second
     a11, a12 = W11[0] + (W11[1] * x1 + W11[2] * y1), W12[0] + (W12[1] * x2 + W12[2] * y2)
@@ -117,7 +127,7 @@ def _solve_both_sliding(pair, first, second):
     g22 = W22[3] + (W22[4] * x2 + W22[5] * y2), W22[6] + (W22[7] * x2 + W22[8] * y2)
     u1x, u1y = b1[1] + (g11[0] * p1 + g12[0] * p2), b1[2] + (g11[1] * p1 + g12[1] * p2)
     u2x, u2y = b2[1] + (g21[0] * p1 + g22[0] * p2), b2[2] + (g21[1] * p1 + g22[1] * p2)
-    # All of what follows is μ times the true across, along and slopes, which the turns do not notice.
+    # All numbers from here on are μ times the true across, along and slopes; the turns are quotients of them.
     along1, along2 = -(x1 * u1x + y1 * u1y), -(x2 * u2x + y2 * u2y)
     across1, across2 = y1 * u1x - x1 * u1y, y2 * u2x - x2 * u2y
     t = 1.0 / mu
@@ -129,12 +139,16 @@ def _solve_both_sliding(pair, first, second):
 
 @inlined
 def _direction_newton_step(pair, first, second, sliding):
-    """Newton's step of both directions [rad]: turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα."""
+    """Newton step of both sliding directions: two angles [rad], from the `SlidingPair` of the present directions.
+
+    `first` = (x1, y1) and `second` are the frictions -μ d per normal impulse of the two contacts of the `PairProblem`.
+    Turning direction 1 by dα changes (x1, y1) by (-y1, x1) dα.
+    """
     W11, W12, W22, _, _, _, _ = pair
     p1, p2, _, _, inverse, g11, g12, g21, g22, along1, along2, across1, across2 = sliding
     (x1, y1), (x2, y2) = first, second
     a11, a12, a21, a22 = inverse
-    # What a turn of direction 1 does to p, then to u; then the same of direction 2.
+    # Change of p, then of u, per turn of direction 1; then the same for direction 2.
     f1, f2 = p1 * (W11[2] * x1 - W11[1] * y1), p1 * (W12[6] * x1 - W12[3] * y1)
     d1, d2 = a12 * f2 - a22 * f1, a21 * f1 - a11 * f2
     vx = g11[0] * d1 + g12[0] * d2 + p1 * (W11[5] * x1 - W11[4] * y1)
@@ -157,10 +171,11 @@ def _direction_newton_step(pair, first, second, sliding):
 
 @kernel
 def _solve_alternately(pair, trial):
-    """Let each contact answer the other's impulse in turn, starting from a trial; then try the result.
+    """Solve each contact of a pair in turn, with the other's impulse fixed, starting from `trial`: a `PairTrial`.
 
-    This is called when a contact that was assumed to stick or open does not, or would turn right round. Newton's method
-    would then go on to a state in which friction pushes the contact along.
+    If one contact sticks and the other slides at the end, this mixture is tried. The kernel is called if a contact that
+    was assumed to stick or open does not, or if a sliding direction would reverse. Newton's method would then go on to
+    a state in which friction pushes the contact along.
     """
     W11, W12, W22, b1, b2, mu, goal = pair
     _, p, q, miss, (x1, y1), (x2, y2) = trial
@@ -184,7 +199,7 @@ def _solve_alternately(pair, trial):
 
 @inlined
 def _turn_directions(pair, trial, sliding):
-    """Trial with both directions turned by Newton's step."""
+    """Return the `PairTrial` `trial` with both sliding directions turned by a Newton step."""
     (x1, y1), (x2, y2) = trial.first, trial.second
     turn1, turn2 = _direction_newton_step(pair, trial.first, trial.second, sliding)
     first, second = rotate_direction(x1, y1, turn1), rotate_direction(x2, y2, turn2)
@@ -193,7 +208,10 @@ def _turn_directions(pair, trial, sliding):
 
 @inlined
 def _try_sliding(sliding, first, second, goal):
-    """Trial of two sliding contacts."""
+    """Make the `PairTrial` of a `SlidingPair`; it is found if both contacts push, with residuals within `goal` [m/s].
+
+    `first` and `second` are their frictions -μ d per normal impulse, with the directions d of sliding.
+    """
     p1, p2, (x1, y1), (x2, y2) = sliding.p1, sliding.p2, first, second
     worst = max(sliding.miss1, sliding.miss2)
     found = p1 >= 0.0 and p2 >= 0.0 and worst <= goal
@@ -202,7 +220,7 @@ def _try_sliding(sliding, first, second, goal):
 
 @inlined
 def solve_block_pair(pair, first, second):
-    """Solve a `PairProblem` from given directions (-μ d): its `PairTrial`."""
+    """Solve a `PairProblem`: its `PairTrial`, from first guesses of the friction -μ d of both contacts."""
     swapped = swap_pair_problem(pair)
     held1 = held2 = opened = turns = 0
     for _ in range(_MAX_NEWTON_STEPS):
@@ -240,7 +258,11 @@ def solve_block_pair(pair, first, second):
 
 @inlined
 def solve_one_contact(contact, mu, goal, body, scratch):
-    """Impulse of a single `WallContact`: (found, impulse [N s], moment [N m s], residual [m/s])."""
+    """Solve a single `WallContact`: (found, impulse [N s], moment [N m s], residual [m/s]).
+
+    mu is the coefficient of friction, `goal` the tolerance of the residual [m/s], and `body` a `FreeBody`. Impulse and
+    moment have the components (normal, tangents).
+    """
     r, b, impulse = contact
     W = add_block_compliance(
         diagonal_delassus_block(r, body.inv_mass, friction_ratio(scratch.body), body.K), scratch.body
@@ -256,7 +278,7 @@ def solve_one_contact(contact, mu, goal, body, scratch):
 
 @inlined
 def _frictionless_response(pair):
-    """Changes of velocity [m/s], by impulses without friction, of two contacts that approach."""
+    """Changes of the velocities of two contacts [m/s] by the impulses that solve their problem without friction."""
     W11, W12, W22 = pair.W11, pair.W12, pair.W22
     b1, b2 = pair.b1[0], pair.b2[0]
     s = 1.0 / (W11[0] * W22[0] - W12[0] * W12[0])
@@ -273,26 +295,29 @@ def _frictionless_response(pair):
 
 @inlined
 def solve_two_contacts(first, second, mu, goal, body, scratch):
-    """Solve two contacts: their impulses.
+    """Solve two contacts of one wall.
 
     Parameters
     ----------
     first, second : WallContact
+        The two contacts.
     mu : float
         Coefficient of friction.
     goal : float
         Tolerance of the residual [m/s].
     body : FreeBody
+        The body without contact impulses.
 
     Returns
     -------
     found : bool
+        True if the impulses solve the problem.
     p, q : tuples of 3 floats
-        Of the first and of the second [N s].
+        Impulses (normal, tangents) of the first and of the second contact [N s].
     moment : tuple of 3 floats
-        Of both [N m s].
+        Sum of their moments about the centre of mass [N m s].
     residual : float
-        [m/s].
+        Residual [m/s].
     """
     (r, b1, f), (s, b2, g) = first, second
     inv_mass, K, ratio = body.inv_mass, body.K, friction_ratio(scratch.body)

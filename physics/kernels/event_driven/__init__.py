@@ -1,1 +1,1 @@
-"""The event-driven scheme: smooth motion to rounding, cut where contacts begin, end, stick, slip or collide."""
+"""Event-driven scheme: smooth motion to rounding between events, at which contacts begin, end, stick, slip, collide."""

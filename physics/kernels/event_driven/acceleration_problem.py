@@ -1,4 +1,7 @@
-"""Contact problem of accelerations at one moment, for the impact's solver, and the contact mode of its solution."""
+"""Acceleration-level contact problem at one moment, and the contact mode that its solution means.
+
+The solver of impacts solves it, with accelerations in place of velocities and forces in place of impulses.
+"""
 
 from __future__ import annotations
 
@@ -33,16 +36,16 @@ from physics.kernels.math.vector import as_vector, plus, row_vector, times
 # Accelerations and forces of the solver below this share of the largest free ones are zero.
 _ZERO_SHARE = 1.0e-8
 
-# Tangential acceleration that stands for sliding where no mixture was found, in largest free ones; the direction of a
-# contact that slides is then off by the inverse of it. A push of `_PAINLEVE_PUSH` times that would stop the sliding:
-# there is no force, only an impulse.
+# If the search has not found the mode of sliding contacts, their sliding is replaced by a tangential acceleration of
+# this size, in units of the largest free one. The direction of sliding has then an error of the inverse of it. A normal
+# force of _PAINLEVE_PUSH times this size would stop the sliding: then no force is consistent, only an impulse.
 _SLIDING_ACCELERATION = 1.0e3
 _PAINLEVE_PUSH = 0.03
 
 
 @inlined
 def set_up_contact(i, slot, r, target, contacts):
-    """Set up contact i of a problem for `contact_solver.solve.solve_contacts`, without a warm start."""
+    """Write contact i of a problem for `solve_contacts`: its slot, arm r and target; its warm start is zero."""
     contacts.slot[i] = slot
     contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2] = r
     contacts.target[i, 0], contacts.target[i, 1], contacts.target[i, 2] = target
@@ -51,11 +54,12 @@ def set_up_contact(i, slot, r, target, contacts):
 
 @kernel
 def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, scratch, candidates):
-    """Write the contact problem of candidates that do not slide into `scratch`; return the free (acceleration, moment).
+    """Write the acceleration-level contact problem of `count` candidates in the state y into `scratch`.
 
-    The problem is that of an impact, with the free acceleration for the velocity, the moment τ - ω x L for the angular
-    momentum, and forces for impulses. The motion of an arm adds to a contact's acceleration, which is made part of its
-    target. `has_sliding`: some of the candidates slide (`candidate_direction`).
+    Returns the free acceleration and the moment τ - ω x L, which take the places of velocity and angular momentum in
+    `solve_contacts`; forces take that of impulses. The acceleration of a contact by the motion of its arm is part of
+    its target. If `has_sliding`, some candidates slide in their `candidates.direction`; this is replaced by a large
+    tangential acceleration. R and w are rotation matrix and angular velocity.
     """
     scene, body = scratch.scene, scratch.body
     walls = scene.walls
@@ -67,7 +71,7 @@ def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, scratch, c
             body.shape, as_vector(body.dims), R, w, axes[0], feature_of(slot, scene), offset_frame, body
         )
         c = qt.cross(w, rate)
-        if has_sliding:  # as if it had accelerated along its sliding for long: no force then turns it
+        if has_sliding:  # a large acceleration along the sliding, whose direction forces hardly turn
             c = plus(c, times(_SLIDING_ACCELERATION * scale, row_vector(candidates.direction, i, 0)))
         set_up_contact(i, slot, r, (-qt.dot(axes[0], c), -qt.dot(axes[1], c), -qt.dot(axes[2], c)), scratch.contacts)
     scratch.stage.mode = TRY_STICKING
@@ -77,13 +81,16 @@ def set_up_resting_problem(count, y, R, w, has_sliding, offset_frame, scratch, c
 
 @inlined
 def has_sliding_direction(way, i):
-    """True if a contact has a direction of sliding."""
+    """True if row i of `way`, the sliding direction of a contact, is not zero."""
     return way[i, 0] != 0.0 or way[i, 1] != 0.0 or way[i, 2] != 0.0
 
 
 @inlined
 def is_redundant_contact(i, count, width, small, scratch):
-    """True if contact i without a force may be left to the others of its wall, of which three push at least."""
+    """True if contact i, which has no force, may open because at least three others of its wall push.
+
+    `width` is the number of impulses per contact, `small` the acceleration that counts as zero [m/s²].
+    """
     contacts = scratch.contacts
     wall, pushing = wall_of(contacts.slot[i], scratch.scene), 0
     for j in range(count):
@@ -94,7 +101,7 @@ def is_redundant_contact(i, count, width, small, scratch):
 
 @inlined
 def store_solver_forces(count, width, scratch, contacts):
-    """Store the solver's forces in `last_force`."""
+    """Store the solver's forces of `count` contacts, `width` numbers each, in `contacts.last_force`; others are 0."""
     clear_last_forces(contacts)
     for i in range(count):
         for c in range(width):
@@ -103,7 +110,10 @@ def store_solver_forces(count, width, scratch, contacts):
 
 @kernel
 def is_body_at_rest(y, w, acceleration, body, thresholds):
-    """True if the body neither moves nor begins to, except for rounding."""
+    """True if a body in the state y neither moves nor begins to move, except for rounding.
+
+    `acceleration` bounds the acceleration of its points [m/s²].
+    """
     v = y[2]
     speed = math.sqrt(qt.dot(v, v)) + body.radius * math.sqrt(qt.dot(w, w))
     return speed <= 2.0 * thresholds.rest_speed and acceleration <= 4.0 * _ZERO_SHARE * body.acceleration
@@ -111,7 +121,11 @@ def is_body_at_rest(y, w, acceleration, body, thresholds):
 
 @kernel
 def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, scratch, motion):
-    """Set the contact mode and the acting contacts from the solution of `set_up_resting_problem`'s problem."""
+    """Read the contact mode from the solution of the problem of `set_up_resting_problem`: a MODE_ code.
+
+    a and `moment` are acceleration and moment with the contact forces. The states of the `count` candidates and the
+    acting contacts are set. `has_sliding` is true if some candidates slide.
+    """
     body = scratch.body
     candidates = motion.candidates
     R, P, w, _ = free_angular_motion(y, offset_frame, body)

@@ -1,4 +1,8 @@
-"""Remove errors of rounding and tolerance from the contacts of a mode, by a projection in the kinetic metric."""
+"""Remove gaps and velocities that a contact mode forbids, by a projection in the kinetic metric.
+
+They are errors of rounding and of the tolerance. An acting contact must have no gap and no normal velocity, and a
+sticking one no tangential velocity.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +19,18 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, row_vector
 from physics.kernels.state.layout import WALL_OFFSET
 
-# Gaps and velocities of contacts below these shares of `touch_gap` and `rounding_speed` are left alone.
+# Gaps and velocities of contacts below these shares of `touch_gap` and `rounding_speed` are not removed.
 _UNSEEN_GAP = 0.1
 _UNSEEN_SPEED = 0.01
 
 
 @inlined
 def _projection_step(holding, P, scratch, motion):
-    """Velocity and turn, both per kinetic metric, that remove `constraint_error` along the rows of the mode."""
+    """Smallest change in the kinetic metric that removes `constraint_error`: (change of velocity, of angular momentum).
+
+    For gaps in place of velocities it is (change of position, moment of inertia times turn). `holding` is true if
+    sticking contacts are also to keep their place along the wall. P is the matrix of the principal axes.
+    """
     k = assemble_unknowns(0.0, holding, scratch, motion)
     F, T = solve_contact_forces(k, P, scratch.body, motion.unknowns)
     s = 1.0 / scratch.body.mass
@@ -31,7 +39,7 @@ def _projection_step(holding, P, scratch, motion):
 
 @inlined
 def _set_velocity_errors(contacts, scene):
-    """Write velocities of acting contacts to `constraint_error`; return the largest that the mode forbids [m/s]."""
+    """Write the velocities of the acting contacts to `constraint_error`; return the largest forbidden one [m/s]."""
     worst = 0.0
     for j in range(contacts.count):
         n = wall_normal(scene.walls, wall_of(contacts.slot[j], scene))
@@ -46,7 +54,11 @@ def _set_velocity_errors(contacts, scene):
 
 @inlined
 def _project_velocities(holding, v, m, P, scratch, motion):
-    """Velocity and angular momentum without contact velocities that the mode forbids (placed)."""
+    """Velocity v and angular momentum m, changed so that contacts have no velocities that the mode forbids.
+
+    `set_contact_kinematics` must have been called. `holding` is true if sticking contacts are to have no tangential
+    velocity either.
+    """
     worst = _set_velocity_errors(motion.contacts, scratch.scene)
     if not worst > _UNSEEN_SPEED * motion.thresholds.rounding_speed:
         return v, m
@@ -56,7 +68,7 @@ def _project_velocities(holding, v, m, P, scratch, motion):
 
 @kernel
 def project_normal_speeds(y, offset_frame, scratch, motion):
-    """State without normal velocities of the acting contacts."""
+    """State y, with velocities changed so that the acting contacts have no normal velocity."""
     x, q, v, m = y
     R, P, w, alpha = free_angular_motion(y, offset_frame, scratch.body)
     set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion)
@@ -66,9 +78,9 @@ def project_normal_speeds(y, offset_frame, scratch, motion):
 
 @kernel
 def project_state(y, offset_frame, scratch, motion):
-    """State without gaps and velocities, above rounding, of contacts in the contact mode.
+    """State y, changed so that the acting contacts have no gaps and no velocities that the contact mode forbids.
 
-    Least change in the kinetic metric: along M⁻¹ Jᵀ.
+    Rounding is left. The change is the smallest in the kinetic metric, along M⁻¹ Jᵀ.
     """
     scene, body = scratch.scene, scratch.body
     contacts = motion.contacts

@@ -1,4 +1,7 @@
-"""Touching contacts: candidates for acting, their kinds, and their accelerations."""
+"""Candidate contacts, which touch and do not leave: find them, and let them act as sticking or sliding contacts.
+
+A contact *acts* if it sticks or slides in the contact mode; otherwise it is open.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,9 @@ from physics.kernels.half_space.contact_point import contact_arm_and_rate, featu
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, plus
 
-# What a body does; the last: nothing, since its last step went too far (`mode_acceptance`).
+# Contact modes of a body, as codes: it flies, collides, moves in contact, rests, has no consistent forces; a contact
+# problem must decide, without or with sliding contacts (`contact_mode`); the last step is taken back
+# (`mode_acceptance`).
 (
     MODE_FLIGHT,
     MODE_IMPACT,
@@ -25,16 +30,19 @@ from physics.kernels.math.vector import as_vector, plus
     MODE_ROLLBACK,
 ) = range(8)
 
-# What a candidate does.
+# States of a candidate.
 CANDIDATE_OPEN, CANDIDATE_STICKING, CANDIDATE_SLIDING = range(3)
 
-# Approach of a contact that will leave that is none, in `motion.thresholds.rest_speed`.
+# Speed of approach, as a share of `motion.thresholds.rest_speed`, below which a contact that opens does not collide.
 _UNSEEN_APPROACH = 1.0e-2
 
 
 @kernel
 def find_candidates(y, offset_frame, scratch, motion):
-    """Write features that touch and do not leave into `candidate`; return (count, whether one approaches)."""
+    """Find the features that touch and do not leave in the state y, and write them to `motion.candidates.slot`.
+
+    Returns (number of candidates, whether a touching feature approaches); if one approaches, the number is 0.
+    """
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
@@ -53,7 +61,10 @@ def find_candidates(y, offset_frame, scratch, motion):
 
 @kernel
 def activate_candidates(count, motion):
-    """Let the candidates act that are not open, with the last forces for shares; mark their slots."""
+    """Make the candidates that are not open the acting contacts, `motion.contacts`; mark them in `smooth.is_active`.
+
+    Their given forces are the last known forces of their slots. `count` is the number of candidates.
+    """
     contacts, smooth, candidates = motion.contacts, motion.smooth, motion.candidates
     k = 0
     for s in range(smooth.is_active.shape[0]):
@@ -72,7 +83,7 @@ def activate_candidates(count, motion):
 
 @inlined
 def has_open_candidate(candidates):
-    """True if a candidate does not act."""
+    """True if any candidate is open."""
     for i in range(candidates.count):
         if candidates.state[i] == CANDIDATE_OPEN:
             return True
@@ -81,7 +92,7 @@ def has_open_candidate(candidates):
 
 @inlined
 def has_normal_speed(motion):
-    """True if an acting candidate moves along its normal, or another one approaches, by more than rounding."""
+    """True if an acting candidate moves along its normal, or an open one approaches, faster than rounding."""
     for i in range(motion.candidates.count):
         rate = motion.smooth.gap_rate[ROW_START, motion.candidates.slot[i]]
         if rate < -motion.thresholds.rounding_speed or (
@@ -93,10 +104,11 @@ def has_normal_speed(motion):
 
 @kernel
 def project_candidate_speeds(y, offset_frame, scratch, motion):
-    """State without normal velocities of all candidates that neither approach nor leave, acting or not.
+    """State y with the small normal velocities of all candidates removed, of acting and of open ones.
 
-    A body may lie on two contacts and rock by less than counts. Setting it down on one contact would otherwise move the
-    other, again and again. If acting contacts have no normal speed, a contact that was just released keeps its own.
+    A body may lie on two contacts and rock between them at speeds below the rest speed. If the normal velocity were
+    removed from the acting contact only, the other one would move, again and again. If acting contacts have no normal
+    speed, and no open one approaches, y is returned as it is, so that a contact just released keeps its speed.
     """
     smooth, contacts, candidates, thresholds = motion.smooth, motion.contacts, motion.candidates, motion.thresholds
     if not has_open_candidate(candidates):
@@ -119,7 +131,10 @@ def project_candidate_speeds(y, offset_frame, scratch, motion):
 
 @inlined
 def contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates):
-    """Acceleration of candidate i: (normal part, tangential part)."""
+    """Acceleration of candidate i: (normal component [m/s²], tangential vector, world frame).
+
+    The body has rotation matrix R, angular velocity w, acceleration a and angular acceleration alpha.
+    """
     scene, body = scratch.scene, scratch.body
     wall = wall_of(candidates.slot[i], scene)
     n = wall_normal(scene.walls, wall)
@@ -133,7 +148,7 @@ def contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates):
 
 @kernel
 def is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion):
-    """True if candidate i slides; writes its direction into `candidate_direction`."""
+    """True if candidate i slides in the state y; its direction is written to `candidates.direction`, else zero."""
     scene, body = scratch.scene, scratch.body
     candidates = motion.candidates
     wall = wall_of(candidates.slot[i], scene)
@@ -154,13 +169,13 @@ def is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion):
 
 @inlined
 def acceleration_scale(w, body):
-    """Size of the accelerations of a body's contacts [m/s²]."""
+    """Scale of the accelerations of a body's contacts, by loads and by the angular velocity w [m/s²]."""
     return body.acceleration + body.radius * qt.dot(w, w)
 
 
 @inlined
 def has_closing_contact(count, motion):
-    """True if a contact that will leave still approaches, by a little."""
+    """True if one of `count` candidates is to open, but still approaches its wall, slowly."""
     thresholds, candidates = motion.thresholds, motion.candidates
     least = -thresholds.rounding_speed - _UNSEEN_APPROACH * thresholds.rest_speed
     for i in range(count):

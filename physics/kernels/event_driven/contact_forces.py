@@ -1,26 +1,28 @@
-"""Forces of the acting contacts: the acceleration-level problem a = A f + b of a contact mode, and its velocities.
+"""Assemble the acceleration-level problem a = A f + b for the forces of the acting contacts in a known contact mode.
 
-A contact mode says of each contact whether it *holds* (its point has no acceleration) or *slides* (no normal
-acceleration; the force is f_n (n - μ d) along the direction d of its sliding). With the acceleration of a contact
+In a contact mode each acting contact *sticks* (its point has no acceleration) or *slides* (no normal acceleration; the
+force is f_n (n - μ d), with the direction d of its sliding). The acceleration of a contact with the arm r_i is
 
-    a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt
+    a_i = dv/dt + dω/dt x r_i + ω x dr_i/dt.
 
-(dr/dt = ω x r for a vertex; a sphere's and an ellipsoid's contact point wander over the body) that is a linear
-system: as many unknowns as equations, three for a contact that holds, one for one that slides. The normal forces of
-more than two contacts of one wall have three unknowns: those that are affine in the place on the wall,
-f_i = y_0 + y_1 a_i + y_2 b_i, have the least norm of all with their resultant, and with them the three combinations of
-rows with the same coefficients stand for the equations. So it stays when one of them holds, which then adds its two
-tangential forces: what a face presses with does not jump where a corner of it stops.
+For a vertex dr/dt = ω x r; the contact point of an ellipsoid wanders over the body, and for a sphere dr/dt = 0. So the
+forces solve a linear system with as many unknowns as equations: three for a sticking contact, one for a sliding one.
 
-The forces that were last known (`given_force`) are a part of the answer, the unknowns only what is still to be added to
-them: a rigid body does not tell which of its corners presses on the floor, or on the wall beside it, and what the
-contact problem of a moment has found to hold (`resting`) does so from then on.
+Three or more contacts of one wall, a *patch*, have three unknowns for their normal forces,
+f_i = y_0 + y_1 a_i + y_2 b_i, affine in the place (a_i, b_i) on the wall. These have the least norm of all normal
+forces with the same resultant. The equations are the three combinations of their rows with the same coefficients. A
+sticking contact of a patch adds its two tangential forces. So the normal forces of a face do not jump when one of its
+corners stops.
 
-The same rows, with velocities or gaps in place of accelerations and pushes along the rows, bring a state back to
-what the contact mode says (`cancel`): the least change in the kinetic metric.
+The last known forces (`given_force`) are a given part of the contact forces; the unknowns are only added to them. For
+the motion of a rigid body does not determine which of its corners pushes on the floor, or on the wall beside it. A
+distribution that the contact problem has found at one moment (`acceleration_problem`) is kept in this way.
 
-Witkin and Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997, part II, section 8, for a = A f + b;
-what differs is friction in it, and that the contact mode is known.
+`constraint_projection` uses the same rows, with velocities or gaps in place of accelerations, to bring a state back to
+the contact mode by the smallest change in the kinetic metric.
+
+Source: Witkin and Baraff, *Physically Based Modeling*, SIGGRAPH course notes, 1997, part II, section 8, for
+a = A f + b. Here it has friction, and the contact mode is known.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, plus, row_vector, times
 from physics.kernels.state.body import principal_attitude
 
-# Contacts of one wall from which on their normal forces are taken as affine.
+# Smallest number of contacts of one wall that make a patch, with affine normal forces.
 MIN_PATCH_CONTACTS = 3
 
 # `motion.contacts.patch` of a contact whose normal force is an unknown of its own.
@@ -43,14 +45,20 @@ NO_PATCH = -1
 
 @inlined
 def apply_inverse_inertia(P, J, h):
-    """I⁻¹ h for the principal axes P and inverse moments J, world frame."""
+    """Multiply a world vector h by the inverse inertia, I⁻¹ h; P is the matrix of the principal axes.
+
+    J are the inverse principal moments [1/(kg m²)].
+    """
     m = qt.transposed_matvec(P, h)
     return qt.matvec(P, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
 
 
 @kernel
 def free_angular_motion(y, offset_frame, body):
-    """Body axes, principal axes, ω and the rate of change of ω without contact: (R, P, ω, I⁻¹(τ - ω x L))."""
+    """Rotation of a body in the state y, without contact forces: (R, P, ω, dω/dt), world frame.
+
+    R and P are the rotation matrices of body axes and principal axes, and dω/dt = I⁻¹(τ - ω x L) with the torque τ.
+    """
     q, L = y[1], y[3]
     R = qt.to_matrix(q)
     P = R
@@ -65,7 +73,10 @@ def free_angular_motion(y, offset_frame, body):
 
 @kernel
 def set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion):
-    """Set arms, velocities, sliding directions and free accelerations (`constraint_error`) of the acting contacts."""
+    """Set arm, velocity, sliding direction and free acceleration (`constraint_error`) of each acting contact at y.
+
+    R is the rotation matrix, w the angular velocity, and alpha the angular acceleration without contact.
+    """
     scene, body = scratch.scene, scratch.body
     contacts = motion.contacts
     shape, walls = body.shape, scene.walls
@@ -88,7 +99,11 @@ def set_contact_kinematics(y, R, w, alpha, offset_frame, scratch, motion):
 
 @inlined
 def _add_to_unknown(m, r, push, row, share, unknowns):
-    """Add the contribution of a contact's `given_force` at r to unknown m."""
+    """Add a contact with the arm r to unknown m, with the weight `share`.
+
+    `push` is the direction of its force, which adds to the unknown's column, and `row` is the direction of its
+    constraint, which adds to the unknown's row.
+    """
     h, e = qt.cross(r, push), qt.cross(r, row)
     for c in range(3):
         unknowns.column_force[m, c] += share * push[c]
@@ -99,14 +114,14 @@ def _add_to_unknown(m, r, push, row, share, unknowns):
 
 @inlined
 def sliding_force_direction(mu, axes, j, body, contacts):
-    """Force of the sliding contact j per newton along the normal."""
+    """Force of the sliding contact j per newton of its normal force: normal and opposed friction, world frame."""
     n, d = axes[0], sliding_direction(row_vector(contacts.slip_direction, j, 0), axes, body)
     return (n[0] - mu * d[0], n[1] - mu * d[1], n[2] - mu * d[2])
 
 
 @inlined
 def _contact_force_direction(mu, axes, j, body, contacts):
-    """Force of contact j per newton along the normal."""
+    """Force of contact j per newton of its normal force: along the normal if it sticks, with friction if it slides."""
     if contacts.sticks[j]:
         return axes[0]
     return sliding_force_direction(mu, axes, j, body, contacts)
@@ -114,7 +129,10 @@ def _contact_force_direction(mu, axes, j, body, contacts):
 
 @inlined
 def _contact_force(normal, first, second, mu, axes, j, body, contacts):
-    """Force of contact j with the push `normal` and, if it sticks, these parts along the other two axes."""
+    """Force of contact j with the normal force `normal` [N], world frame.
+
+    If it sticks, `first` and `second` are its forces along the two tangents of the wall.
+    """
     f = times(normal, _contact_force_direction(mu, axes, j, body, contacts))
     if contacts.sticks[j]:
         f = plus(f, plus(times(first, axes[1]), times(second, axes[2])))
@@ -123,7 +141,10 @@ def _contact_force(normal, first, second, mu, axes, j, body, contacts):
 
 @kernel
 def _add_shares(mu, scratch, motion):
-    """Sum force and moment of all shares into `given_wrench`; without friction they do not matter and are left out."""
+    """Write the sums of the given forces of all contacts, and of their moments, into `unknowns.given_wrench`.
+
+    Without friction the given forces are left out, and the sums are zero.
+    """
     contacts = motion.contacts
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
@@ -138,7 +159,7 @@ def _add_shares(mu, scratch, motion):
 
 @inlined
 def _clear_unknowns(m, count, unknowns):
-    """Clear the unknowns m <= k < m + count."""
+    """Set columns, rows and right-hand sides of the `count` unknowns from m on to zero."""
     for k in range(m, m + count):
         unknowns.rhs[k] = 0.0
         for c in range(3):
@@ -148,7 +169,10 @@ def _clear_unknowns(m, count, unknowns):
 
 @kernel
 def _add_sticking_unknowns(m, j, first_axis, axes, motion):
-    """Add the unknowns of the sticking contact j from the axis `first_axis` on: the force along each."""
+    """Add unknowns for the forces of the sticking contact j along its wall's axes, from number `first_axis` on.
+
+    m is the number of the first unknown; the number after the last one is returned.
+    """
     r, b = row_vector(motion.contacts.arm, j, 0), row_vector(motion.contacts.constraint_error, j, 0)
     motion.contacts.first_unknown[j] = m
     _clear_unknowns(m, 3 - first_axis, motion.unknowns)
@@ -161,7 +185,10 @@ def _add_sticking_unknowns(m, j, first_axis, axes, motion):
 
 @kernel
 def _add_patch_unknowns(m, first, last, mu, axes, body, motion):
-    """Add three unknowns for the normal forces of the contacts first <= j < last, which share a wall."""
+    """Add the three unknowns m, m + 1, m + 2 of the normal forces of a patch: contacts first <= j < last of one wall.
+
+    Returns m + 3.
+    """
     unknowns, contacts = motion.unknowns, motion.contacts
     _clear_unknowns(m, 3, unknowns)
     radius = body.radius
@@ -188,9 +215,11 @@ def _add_patch_unknowns(m, first, last, mu, axes, body, motion):
 
 @kernel
 def assemble_unknowns(mu, holding, scratch, motion):
-    """Fill columns, rows, `given_wrench` and right-hand sides from `constraint_error`; return the number of unknowns.
+    """Assemble the linear system of the contact mode in `motion.unknowns`; return its number of unknowns.
 
-    `holding`: contacts that hold do so along the wall, too.
+    Filled are columns (force and moment per unknown), rows (directions of constraints), `given_wrench`, and right-hand
+    sides, from `constraint_error` of the contacts. `holding` is true if sticking contacts also have equations along the
+    wall. mu is the friction coefficient.
     """
     scene = scratch.scene
     unknowns, contacts = motion.unknowns, motion.contacts
@@ -206,7 +235,7 @@ def assemble_unknowns(mu, holding, scratch, motion):
         while last < contacts.count and wall_of(contacts.slot[last], scene) == wall:
             contacts.patch[last] = NO_PATCH
             last += 1
-        own = 0  # the first axis along which a contact that holds has a force of its own
+        own = 0  # first axis along which a sticking contact has an unknown of its own
         if last - first >= MIN_PATCH_CONTACTS:
             m = _add_patch_unknowns(m, first, last, mu, axes, scratch.body, motion)
             own = 1
@@ -232,12 +261,15 @@ def assemble_unknowns(mu, holding, scratch, motion):
 
 @kernel
 def recover_contact_forces(mu, scratch, motion):
-    """Force of each acting contact (`force`, `normal`) from the unknowns, with the shares where they count."""
+    """Compute the force of each acting contact from the solved unknowns and the given forces.
+
+    Written are `contacts.force`, in the world frame, and its normal component `contacts.normal` [N].
+    """
     contacts, unknowns = motion.contacts, motion.unknowns
     for j in range(contacts.count):
         axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
         k, p, f = contacts.first_unknown[j], contacts.patch[j], row_vector(contacts.given_force, j, 0)
-        if not mu > 0.0:  # `_add_shares` leaves them out: the unknowns are all of the force
+        if not mu > 0.0:  # `_add_shares` leaves given forces out: the unknowns are the whole force
             f = (0.0, 0.0, 0.0)
         if p != NO_PATCH:
             s = unknowns.value[p]
@@ -258,14 +290,14 @@ def recover_contact_forces(mu, scratch, motion):
 
 @inlined
 def clear_last_forces(contacts):
-    """Forget all earlier forces."""
+    """Set the last known forces of all features, `contacts.last_force`, to zero."""
     for s in range(contacts.last_force.shape[0]):
         contacts.last_force[s, 0] = contacts.last_force[s, 1] = contacts.last_force[s, 2] = 0.0
 
 
 @kernel
 def store_last_forces(scene, contacts):
-    """Store the forces of the acting contacts in `last_force`, zero for all others."""
+    """Store the forces of the acting contacts in `contacts.last_force`, along the wall's axes; 0 for other features."""
     clear_last_forces(contacts)
     for j in range(contacts.count):
         axes, f = wall_axes(scene.walls, wall_of(contacts.slot[j], scene)), row_vector(contacts.force, j, 0)

@@ -1,14 +1,17 @@
-"""Contact mode of a moment, from the acceleration-level complementarity problem.
+"""Find the contact mode of a body at one moment, from the acceleration-level complementarity problem.
 
-    a_n >= 0,  f_n >= 0,  a_n f_n = 0;    a contact that has no tangential velocity holds (a_t = 0, |f_t| <= μ f_n)
-    or starts to slide (f_t = -μ f_n a_t/|a_t|); one that has slides on (f_t = -μ f_n u_t/|u_t|)
+Let a contact have the acceleration a, the force f and the velocity u, each with normal (n) and tangential (t) parts:
 
-When no contact slides, these are the conditions of an impact with accelerations in place of velocities, and the same
-solver gives them: exact cones, with pivoting as the fallback. When some slide, contacts change between open, sticking
-and sliding until all conditions hold; each trial is one linear system (`contact_forces`). If the search goes round in
-circles, the solver is called again, with a large tangential acceleration in place of each contact's sliding. If it can
-only stop the sliding (Painlevé's paradox: a sliding contact may have no force), the velocities have to jump, and `step`
-applies an impulse.
+    a_n >= 0,  f_n >= 0,  a_n f_n = 0;
+    u_t = 0:   a_t = 0 and |f_t| <= μ f_n (it sticks),  or  f_t = -μ f_n a_t/|a_t| (it begins to slide);
+    u_t ≠ 0:   f_t = -μ f_n u_t/|u_t| (it slides).
+
+If no contact slides, these are the conditions of an impact with accelerations in place of velocities. The solver of
+impacts solves them with exact cones, and with pivoting as the fallback. If some contacts slide, contacts change between
+open, sticking and sliding until all conditions hold; each trial is one linear system (`contact_forces`). If this search
+does not end, the solver of impacts is used, with a large tangential acceleration in place of each contact's sliding. If
+its solution stops the sliding, no force is consistent (Painlevé's paradox). Then the velocities jump, by an impulse in
+`step`.
 """
 
 from __future__ import annotations
@@ -31,11 +34,11 @@ from physics.kernels.event_driven.contact_mode_search import search_contact_mode
 
 @kernel
 def find_contact_mode(y, friction, offset_frame, scratch, motion):
-    """Find contact mode and acting contacts at y: (contact mode, number of candidates, acceleration, moment).
+    """Find the contact mode and the acting contacts in the state y: (MODE_ code, count, acceleration, moment).
 
-    `MODE_UNDECIDED`: none of the candidates slides, and the contact problem with this acceleration and moment, which is
-    posed in `scratch`, decides (`read_resting_mode`). `MODE_UNDECIDED_SLIDING`: some do, no mixture was found, and that
-    problem decides for them, too.
+    `count` is the number of candidates. With `MODE_UNDECIDED` no candidate slides, and a contact problem must decide:
+    it is written to `scratch`, and acceleration and moment are those without contact (`read_resting_mode`). With
+    `MODE_UNDECIDED_SLIDING` some candidates slide, the search found no mode, and the problem must decide as well.
     """
     zero = (0.0, 0.0, 0.0)
     motion.contacts.count = 0

@@ -1,4 +1,8 @@
-"""Search for the contact mode when some contacts slide, by trials of one linear system each."""
+"""Search for the contact mode of a body with sliding contacts, by trials; each trial solves one linear system.
+
+A trial assumes a state for each candidate contact: open, sticking or sliding. The condition that it violates most gives
+the next trial.
+"""
 
 from __future__ import annotations
 
@@ -27,22 +31,24 @@ from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, plus, row_vector
 
-# Accelerations and forces of an exact trial below this share of the largest free ones are zero.
+# Accelerations and forces of a trial below this share of the largest free ones are zero.
 _EXACT_ZERO_SHARE = 1.0e-11
 
-# Trials of a mixture, and how often one contact may change in them.
+# Largest number of trials, and of changes of one contact in them.
 _MAX_MODE_TRIALS = 60
 _MAX_MODE_CHANGES = 6
 
-# Directions of sliding from rest are found when they no longer change by more than this.
+# A direction in which a contact begins to slide is found when it changes by less than this in a trial [rad].
 _SAME_DIRECTION = 1.0e-9
 
 
 @kernel
 def _worst_violation(count, rates, scale, offset_frame, scratch, motion):
-    """The change that a trial needs most: (candidate, its new kind), -1 when all conditions hold.
+    """Find the candidate whose condition a trial violates most: (candidate, its new state); -1 if all conditions hold.
 
-    `rates` are the attitude, the angular velocity, and both accelerations of the trial.
+    First a contact that pulls opens, then one outside its friction cone slides. Then an open contact that closes acts,
+    and a contact that begins to slide turns or sticks. `rates` are rotation matrix, angular velocity, acceleration and
+    angular acceleration of the body in the trial; `scale` is that of accelerations [m/s²].
     """
     body = scratch.body
     candidates, contacts = motion.candidates, motion.contacts
@@ -96,7 +102,7 @@ def _worst_violation(count, rates, scale, offset_frame, scratch, motion):
 
 @inlined
 def has_last_forces(contacts):
-    """True if any force is known from an earlier moment."""
+    """True if any contact force is known from an earlier moment."""
     for s in range(contacts.last_force.shape[0]):
         if contacts.last_force[s, 0] != 0.0:
             return True
@@ -105,7 +111,10 @@ def has_last_forces(contacts):
 
 @kernel
 def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
-    """Do `search_contact_modes` with the last forces unchanged."""
+    """Search the contact mode by trials from the sliding velocities in the state y; return whether it was found.
+
+    The last known forces are given parts of the contact forces. The arguments are those of `search_contact_modes`.
+    """
     body = scratch.body
     candidates = motion.candidates
     scale = body.acceleration + body.radius * qt.dot(w, w)
@@ -140,7 +149,12 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, moti
 
 @kernel
 def search_contact_modes(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
-    """Find the kinds of the candidates when some slide, with or without the last forces; return success."""
+    """Find the contact mode of a body with `count` candidates, some of which slide; return whether it was found.
+
+    The search starts from the last known forces; if it fails, it is repeated without them. y is the state, R and P are
+    the rotation matrices of body axes and principal axes, w is the angular velocity, and `alpha_free` the angular
+    acceleration without contact. The states of the candidates and the acting contacts are set.
+    """
     if search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, motion):
         return True
     if not has_last_forces(motion.contacts):

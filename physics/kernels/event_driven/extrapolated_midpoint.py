@@ -1,8 +1,11 @@
-"""Smooth motion in one contact mode: the midpoint rule, extrapolated to any order.
+"""Make one step of smooth motion in a contact mode by the extrapolated midpoint rule, of order up to 16.
 
-One step of length h is made by Gragg's midpoint rule with 2, 4, 6, ... parts; its error is a series in the square
-of the parts' length, so that each further number of parts raises the order by two (Bulirsch and Stoer). Two
-successive orders that agree end the step; if 16 does not do, it is cut. Constant forces need two rules.
+A step of length h is made by Gragg's midpoint rule with 2, 4, 6, ... parts. The error of the rule is a series in the
+square of the parts' length, so each further number of parts raises the order by two (Bulirsch and Stoer). The step is
+done when two successive orders agree to the tolerance. If order 16 is not enough, the step is made shorter. Constant
+forces need two rules.
+
+States are rows of `motion.smooth.y`: ROW_START at the start of the step, ROW_END at its end.
 
 Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.9, for the rule, its smoothing step and
 the table.
@@ -40,43 +43,45 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.state.layout import SPHERE
 
-# A step is cut to this share when the extrapolation does not settle, and no further than to SHORTEST of the time
+# A step is cut to this share if the extrapolation does not converge; the shortest step is the second share of the time
 # requested.
 SEGMENT_STEP_CUT = 0.25
 SEGMENT_SHORTEST_STEP = 1.0e-12
 
-# The next step is this many times as long when at most EASY rules were needed.
+# The next step is this many times as long if at most so many rules were needed.
 SEGMENT_STEP_GROWTH = 4.0
 SEGMENT_EASY_RULES = 4
 
-# Sliding turns when its acceleration is off its direction by this share, and then a step is so long at most, in times
-# |u|/|a|. Where it is straight but for less than that it turns just before it stops: there a step goes so far.
+# The direction of sliding turns if the acceleration a differs from it by more than _BENT_SHARE of |a|. Then a step is
+# at most _BENT_STEP |u|/|a| long. Sliding that is nearly straight still turns just before it stops, unless it differs
+# by less than _STRAIGHT_SHARE. So a step ends at _SHORT_OF_STOP of the time of the stop.
 _BENT_SHARE = 1.0e-4
 _BENT_STEP = 0.5
 _STRAIGHT_SHARE = 1.0e-14
 _SHORT_OF_STOP = 0.75
 
-# The direction of a slip follows what acts within the time |u|/K, K the acceleration that friction gives across it for
-# each radian. No step is longer than STIFF of these: beyond it is not stable, by less than the tolerance of a speed.
+# The direction of a slip u follows the loads within the time |u|/K, with the acceleration K that friction gives across
+# it for each radian. No step is longer than this many such times: a longer one is unstable, and the error of the speed
+# would not show it.
 _STIFF_STEP = 1.5
 
-# In contact an extrapolation goes on to FINER of the tolerance, and no further than to rounding, FINEST: the time at
-# which a force or a slip is used up may be off by many times as much as the state.
+# In contact an extrapolation goes on to this share of the tolerance, but not below _FINEST_TOLERANCE, rounding. The
+# time at which a force or a slip vanishes may have an error many times as large as that of the state.
 _CONTACT_TOLERANCE_SHARE = 1.0e-2
 _FINEST_TOLERANCE = 1.0e-13
 
-# Rules after which it shows whether an extrapolation will settle: when its errors, falling twice as fast as they did
-# last, would not.
+# From this rule on an extrapolation is given up if it will not converge: if its error, falling from rule to rule twice
+# as fast as it did last, would still be too large at the last rule.
 _FIRST_CONVERGENCE_CHECK = 3
 
-# A body with corners turns by at most this in a step, so that the gaps at its ends and their rates show whether
-# a corner dipped into a wall between them [rad].
+# Largest turn of a body with corners in a step [rad]. With it the gaps and their rates at both ends of the step show
+# whether a corner dipped into a wall in between.
 _MAX_STEP_ROTATION = 0.25
 
 
 @inlined
 def get_state_row(smooth, row):
-    """(x, q, v, L) of a row of `y`."""
+    """Read the state (x, q, v, L) from a row of `smooth.y`."""
     y = smooth.y
     return (
         (y[row, Y_POSITION], y[row, Y_POSITION + 1], y[row, Y_POSITION + 2]),
@@ -88,7 +93,7 @@ def get_state_row(smooth, row):
 
 @inlined
 def put_state_row(smooth, row, state):
-    """Write (x, q, v, L) to a row of `y`."""
+    """Write `state` = (x, q, v, L) to a row of `smooth.y`."""
     x, q, v, m = state
     y = smooth.y
     y[row, Y_POSITION], y[row, Y_POSITION + 1], y[row, Y_POSITION + 2] = x
@@ -99,7 +104,11 @@ def put_state_row(smooth, row, state):
 
 @kernel
 def compute_state_rate(row, later, offset_frame, scratch, motion):
-    """Write the rate of change of a row of `y`, `later` [s] than START, into `rate`, and forces into the unknowns."""
+    """Compute the rate of change of the state in a row of `smooth.y`, and write it to `smooth.rate`.
+
+    The state is that of a time `later` [s] than the start of the step. The contact forces are left in
+    `motion.unknowns`.
+    """
     body = scratch.body
     state = get_state_row(motion.smooth, row)
     refresh_loads(state, later, offset_frame, body)
@@ -122,7 +131,10 @@ def compute_state_rate(row, later, offset_frame, scratch, motion):
 
 @kernel
 def set_error_scale(h, body, smooth):
-    """Set the scales of the errors of a step whose start `prepare_extrapolated_step` has prepared."""
+    """Set `smooth.scale`, the units in which the errors of a step of length h are measured.
+
+    `prepare_extrapolated_step` must have prepared the start of the step.
+    """
     x, _, v, _ = get_state_row(smooth, ROW_START)
     speed = math.sqrt(qt.dot(v, v)) + body.radius * smooth.start_angular_speed + body.acceleration * h
     place_size = body.radius + max(abs(x[0]), max(abs(x[1]), abs(x[2])))
@@ -136,7 +148,7 @@ def set_error_scale(h, body, smooth):
 
 @kernel
 def _midpoint_rule(parts, h, offset_frame, scratch, motion):
-    """Do one midpoint rule with `parts` parts from START, smoothed, into row END."""
+    """Make one midpoint rule with `parts` parts over h [s], from ROW_START into ROW_END of `smooth.y`, smoothed."""
     y, rate = motion.smooth.y, motion.smooth.rate
     s = h / parts
     for c in range(Y_SIZE):
@@ -155,7 +167,10 @@ def _midpoint_rule(parts, h, offset_frame, scratch, motion):
 
 @kernel
 def try_extrapolated_step(h, offset_frame, scratch, motion):
-    """Compute row END from row START, h later (`first_rate` known): (relative error, rules used)."""
+    """Make a step of length h [s] from ROW_START to ROW_END of `smooth.y`: (relative error, midpoint rules used).
+
+    `prepare_extrapolated_step` must have prepared the start. The step fails if the error is above the tolerance.
+    """
     smooth = motion.smooth
     table, y = smooth.extrapolation_table, smooth.y
     goal = scratch.settings.tolerance
@@ -196,12 +211,12 @@ def try_extrapolated_step(h, offset_frame, scratch, motion):
 
 @kernel
 def prepare_extrapolated_step(left, offset_frame, scratch, motion):
-    """Prepare row START for `try_extrapolated_step`; return the longest useful step.
+    """Prepare a step from ROW_START of `smooth.y` for `try_extrapolated_step`; return the longest useful step [s].
 
     The step is limited by the time `left`, by the length that the last step's errors suggest, by a turn of
-    TURN_AT_MOST, and by the time at which a contact with its present deceleration stops sliding. In flight through a
-    field it is also limited by the time in which the body moves by its radius, so that no wall is reached and left
-    again unseen.
+    `_MAX_STEP_ROTATION`, and by the time at which a contact with its present deceleration stops sliding. In flight
+    through a force field it is also limited by the time in which the body moves by its radius, so that no wall is
+    reached and left again unseen.
     """
     body = scratch.body
     contacts = motion.contacts
@@ -233,7 +248,7 @@ def prepare_extrapolated_step(left, offset_frame, scratch, motion):
 
 @inlined
 def _set_first_rate(offset_frame, scratch, motion):
-    """Set `first_rate`, the rate at START."""
+    """Set `smooth.first_rate`, the rate of change of the state at the start of the step."""
     compute_state_rate(ROW_START, 0.0, offset_frame, scratch, motion)
     for c in range(Y_SIZE):
         motion.smooth.first_rate[c] = motion.smooth.rate[c]
@@ -241,7 +256,11 @@ def _set_first_rate(offset_frame, scratch, motion):
 
 @kernel
 def _begin_slide(P, offset_frame, scratch, motion):
-    """Prepare the only contact, which slides, at START; a creeping one gets the direction of `slip_onset`."""
+    """Prepare a step with a single contact, which slides; P is the matrix of the principal axes.
+
+    If the contact begins to slide, or is still as slow (`is_creeping`), its direction is that of `slip_onset`, and the
+    turning rate of this direction is set.
+    """
     contacts = motion.contacts
     contacts.friction_turn_stiffness = friction_turn_stiffness(P, scratch, motion)
     _, contacts.start_slip_speed = sliding_velocity(0, scratch.scene, contacts)
@@ -260,7 +279,10 @@ def _begin_slide(P, offset_frame, scratch, motion):
 
 @inlined
 def _set_slip_turn_rate(offset_frame, scratch, motion):
-    """Set `slip_turn_rate` of the only contact, from a state a moment ahead."""
+    """Set `slip_turn_rate`, the rate at which the slip direction of the only contact turns [rad/s].
+
+    It follows from the direction at a state a moment after the start of the step.
+    """
     contacts, pace, smooth = motion.contacts, motion.pace, motion.smooth
     d = row_vector(contacts.slip_direction, 0, 0)
     for c in range(Y_SIZE):
@@ -272,10 +294,11 @@ def _set_slip_turn_rate(offset_frame, scratch, motion):
 
 @inlined
 def _limit_to_slip_stop(h, P, scratch, motion):
-    """h, or less: until the first contact stops sliding if it is slowed as at the start, or has turned its sliding.
+    """Shorten a step of length h [s], so that sliding does not stop or turn far within it; return its length.
 
-    The direction of a velocity u + a t is analytic up to the time |u|/|a| (where a complex t makes it vanish), and no
-    step much longer than that is of any high order.
+    The step ends at the latest when a contact stops sliding at the deceleration of its start. Where the direction of
+    sliding turns, the step is a share of |u|/|a|: the direction of a velocity u + a t is analytic up to this time
+    (where it vanishes at a complex t), and a much longer step has no high order. P is the matrix of the principal axes.
     """
     contacts = motion.contacts
     for j in range(contacts.count):
@@ -292,6 +315,6 @@ def _limit_to_slip_stop(h, P, scratch, motion):
                 h *= _SHORT_OF_STOP
         if bend > _BENT_SHARE * size:
             h = min(h, _BENT_STEP * speed / size)
-        if bend > _STRAIGHT_SHARE * size and contacts.friction_turn_stiffness > 0.0:  # 0 of more contacts than one
+        if bend > _STRAIGHT_SHARE * size and contacts.friction_turn_stiffness > 0.0:  # 0 for several contacts
             h = min(h, _STIFF_STEP * speed / contacts.friction_turn_stiffness)
     return h

@@ -1,8 +1,8 @@
-"""Forces that dip below their bounds and come back within one smooth step, unseen at its ends.
+"""Find force margins that fall below zero and come back within one smooth step, unseen at its ends.
 
-The cubic through the margins and their rates at both ends shows such dips, as for gaps. The rates are differences along
-the motion. Where the cubic comes close to zero, the step is made up to its lowest point only, and the margin is tested
-there.
+A force margin is that of a force guard (`guards`). The cubic through a margin and its rates at both ends of the step
+shows such dips, as for gaps. The rates are differences along the motion. If the cubic comes close to zero, the step is
+made only up to the cubic's lowest point, and the margin is tested there.
 """
 
 from __future__ import annotations
@@ -15,25 +15,29 @@ from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rat
 from physics.kernels.event_driven.guards import FORCE_MARGIN_TOLERANCE, cone_excess
 from physics.kernels.event_driven.workspace import ROW_CURRENT, ROW_END, ROW_START, Y_SIZE
 
-# Rows of `motion.contacts.margin`: margins at both ends of a step, and a moment inside of it.
+# Row of `motion.contacts.margin` for a state a short time inside the step; rows ROW_START and ROW_END are its ends.
 _INSIDE_ROW = 2
 
-# That moment, in steps.
+# This short time, as a share of the step.
 _PROBE_SHARE = 1.0e-4
 
-# A cubic is believed but for this share of the larger margin at its ends, and these need be no better known than this.
-# Its lowest point is looked at where it is no nearer to an end of the step than BESIDE of it.
+# The error of a cubic is at most this share of the larger margin at its ends. Steps with both margins below
+# _UNSEEN_MARGIN are not tested. The lowest point of the cubic is tested if it is at least _END_ZONE steps from both
+# ends, or below zero.
 _CUBIC_DOUBT = 0.1
 _UNSEEN_MARGIN = 100.0 * FORCE_MARGIN_TOLERANCE
 _END_ZONE = 0.02
 
-# Rules after which a step is known to be that of forces which do not change.
+# A step that needed at most this many midpoint rules has constant forces.
 _CONSTANT_FORCE_RULES = 2
 
 
 @kernel
 def store_force_margins(row, scratch, motion):
-    """Write the margins of push and cone of the acting contacts, from the unknowns, to a row of `margin` [weights]."""
+    """Write the push and cone margins of the acting contacts [weights] to a row of `motion.contacts.margin`.
+
+    They belong to the contact forces that were solved last, in `motion.unknowns`.
+    """
     contacts = motion.contacts
     recover_contact_forces(scratch.body.mu, scratch, motion)
     for j in range(contacts.count):
@@ -45,9 +49,9 @@ def store_force_margins(row, scratch, motion):
 
 @inlined
 def _probe_margins(row, t, moment, offset_frame, scratch, motion):
-    """Write the margins of the forces at t + `moment` [s] into the row `_INSIDE_ROW`.
+    """Write the force margins at the time t + `moment` [s] of the step into the row `_INSIDE_ROW` of margins.
 
-    The state there is extrapolated from a row of `motion.smooth.y`, by the rate of change `motion.smooth.rate`.
+    The state at this time is extrapolated from `row` of `motion.smooth.y`, the state at t, by `motion.smooth.rate`.
     """
     for c in range(Y_SIZE):
         motion.smooth.y[ROW_CURRENT, c] = motion.smooth.y[row, c] + moment * motion.smooth.rate[c]
@@ -57,7 +61,10 @@ def _probe_margins(row, t, moment, offset_frame, scratch, motion):
 
 @inlined
 def _cubic_interior_minimum(low, fall, high, rise, h):
-    """Lowest point within h of a cubic that begins at `low` and falls, and ends at `high` and rises: (time, value)."""
+    """Lowest point on [0, h] of the cubic with the value `low` and the slope `fall` < 0 at 0, `high` and `rise` at h.
+
+    Returns (time, value).
+    """
     c = (3.0 * (high - low) / h - 2.0 * fall - rise) / h
     k = (fall + rise - 2.0 * (high - low) / h) / (h * h)
     t = -fall / (c + math.sqrt(c * c - 3.0 * k * fall))
@@ -66,9 +73,10 @@ def _cubic_interior_minimum(low, fall, high, rise, h):
 
 @kernel
 def find_force_minimum(h, used, offset_frame, scratch, motion):
-    """Earliest time within the step of h to END at which a margin of force may be used up; h without one.
+    """Earliest time within a step of h [s] at which a force margin may be used up; h if there is none.
 
-    START of `margin` holds the data of the start of the step; forces, rates and unknowns are those of END.
+    `used` is the number of midpoint rules of the step. The margins at its start must be in ROW_START of
+    `motion.contacts.margin`; forces, rate and unknowns must be those of its end, and they are again afterwards.
     """
     contacts, smooth = motion.contacts, motion.smooth
     if contacts.count == 0 or used <= _CONSTANT_FORCE_RULES or not smooth.weight > 0.0:

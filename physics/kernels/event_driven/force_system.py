@@ -1,4 +1,4 @@
-"""Linear system for the forces of a contact mode: its independent rows, and its solution (`contact_forces`)."""
+"""Solve the linear system for the forces of a contact mode (`contact_forces`), whose rows may be dependent."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.full_pivot_solve import solve_full_pivot, solve_least_norm
 from physics.kernels.math.vector import plus, row_vector, times
 
-# A pivot of less than this share of the largest may be that of a row which says what others say.
+# A pivot below this share of the largest one may be that of a row that depends linearly on others.
 _DOUBTFUL_PIVOT = 1.0e-7
 
 
 @kernel
 def _set_metric(m, P, body, unknowns):
-    """Fill `matrix` with the products of the rows in their metric, and the right-hand side with 0."""
+    """Fill `unknowns.matrix` with products of the m constraint rows in the kinetic metric; the right-hand side is 0.
+
+    P is the rotation matrix of the principal axes.
+    """
     inv_mass, J, A = 1.0 / body.mass, body.J, unknowns.matrix
     for k in range(m):
         F, g = row_vector(unknowns.row, k, 0), apply_inverse_inertia(P, J, row_vector(unknowns.row_moment, k, 0))
@@ -33,9 +36,10 @@ def _set_metric(m, P, body, unknowns):
 
 @kernel
 def _choose_rows(m, P, body, unknowns):
-    """Mark rows that are no sums of others in `independent_row`, by their own metric; return their number.
+    """Choose linearly independent rows among the m constraint rows; return their number.
 
-    The largest entry of a positive semidefinite matrix is on the diagonal, so columns of pivots are rows, too.
+    Their indices come first in `unknowns.independent_row`. The matrix of products of rows is positive semidefinite, so
+    its largest entry is on the diagonal, and the columns of the pivots are indices of rows, too.
     """
     _set_metric(m, P, body, unknowns)
     rank, _ = solve_full_pivot(m, unknowns.matrix, unknowns.independent_row, unknowns.value)
@@ -44,7 +48,7 @@ def _choose_rows(m, P, body, unknowns):
 
 @kernel
 def _set_rows(rows, m, P, body, unknowns):
-    """Fill `matrix` with the `rows` chosen equations of the m unknowns."""
+    """Fill `unknowns.matrix` with the equations of m unknowns, of the first `rows` indices in `independent_row`."""
     inv_mass, J, A = 1.0 / body.mass, body.J, unknowns.matrix
     F, g = row_vector(unknowns.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(unknowns.given_wrench, 1, 0))
     for i in range(rows):
@@ -66,12 +70,13 @@ def _set_rows(rows, m, P, body, unknowns):
 
 @kernel
 def solve_contact_forces(m, P, body, unknowns):
-    """Solve for the m unknowns that change the shares least; return total force and moment of the contacts.
+    """Solve for the m unknowns, which change the given forces least; return the contacts' total force and moment.
 
-    Rows of two contacts may be dependent. If each contact pushes along its row, the matrix shows it: a row whose
-    independent part is the share e gives a pivot of e². If one slides, its friction pushes elsewhere, and the pivot is
-    of the order e. A row that differs from a sum of others by rounding would then still be solved, by forces that stop
-    a body although no contact holds it. So where a pivot is small the rows are chosen by their own metric.
+    Rows of several contacts may be linearly dependent. If each contact pushes along its row, the pivots show it: a row
+    whose independent part is the share e gives a pivot of the order e². If a contact slides, its force has another
+    direction than its row, and the pivot is of the order e. A row that differs from a sum of others by rounding only
+    would then be solved, by forces that stop a body although no contact holds it. So if a pivot is small, independent
+    rows are chosen by `_choose_rows`, and the solution of least norm is taken.
     """
     for k in range(m):
         unknowns.independent_row[k] = k
@@ -94,7 +99,11 @@ def solve_contact_forces(m, P, body, unknowns):
 
 @kernel
 def solve_mode_forces(y, offset_frame, scratch, motion):
-    """Forces of the contact mode at y: (total force, total moment, ω, dω/dt without contact, principal axes)."""
+    """Solve the contact forces of the contact mode in the state y.
+
+    Returns (total force [N], total moment about the centre of mass [N m], ω, dω/dt without contact, matrix of the
+    principal axes).
+    """
     body = scratch.body
     R, P, w, alpha = free_angular_motion(y, offset_frame, body)
     zero = (0.0, 0.0, 0.0)

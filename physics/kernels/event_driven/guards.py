@@ -1,16 +1,19 @@
-"""Guards that end a contact mode: the smallest of the quantities that must stay positive during a smooth step.
+"""Guards of a contact mode: margins that stay positive while the mode lasts; the first one that is used up is an event.
 
 - *Gap* of every feature that does not act, in radii. A dip between the ends of a step shows in the cubic through the
   gaps and their rates at both ends.
-- *Push* of every contact that acts, in weights.
-- *Load*: of a touching vertex that was left to the other three of a sliding face because the affine force pulled there,
-  what that force still pulls, in weights.
-- *Cone*: what friction could do beyond what a contact that holds asks of it, in weights. Two contacts that hold on
-  one wall may share what acts along their line as they like, so that for them it is what is left of both.
-- *Speed* of every contact that slides, against the direction at the start of the step, in the speed of the body.
+- *Push*: normal force of every contact that acts, in weights.
+- *Load*: of a sliding face, of which three vertices act. The fourth vertex touches, but the affine normal force would
+  pull there. The margin is this pull, in weights.
+- *Cone*: of every sticking contact, the friction that it could exert beyond its present friction, in weights. Two
+  sticking contacts of one wall may distribute the force along their line in any way, so they have a common margin.
+- *Speed* of every sliding contact, along its direction at the start of the step, in units of the body's speed.
 
-The forces of contacts that are more than the body's motion needs (a corner that holds on the floor and at a wall) can
-be shared out in many ways, of which a linear solve takes one: `mode_acceptance` is for what that one says in vain.
+If a body has more contacts than its motion needs (such as a corner that sticks at the floor and at a wall), their
+forces can be distributed in many ways, of which a linear solve takes one. Force guards of this one may end a mode that
+could go on. `mode_acceptance` treats this case.
+
+A contact, or its feature, *acts* if it sticks or slides in the present contact mode; otherwise it is open.
 """
 
 from __future__ import annotations
@@ -40,13 +43,16 @@ GUARD_NONE, GUARD_GAP, GUARD_PUSH, GUARD_CONE, GUARD_SPEED, GUARD_LOAD, GUARD_ST
 # Guards of force.
 FORCE_GUARDS = (GUARD_PUSH, GUARD_CONE, GUARD_LOAD)
 
-# Forces of this many weights are rounding: a push or a cone is given up only when it is missed by more.
+# Forces of this many weights are rounding: a force guard ends a mode only if its margin is below minus this.
 FORCE_MARGIN_TOLERANCE = 1.0e-9
 
 
 @kernel
 def compute_feature_gaps(row, offset_frame, scratch, smooth):
-    """Write gaps and rates of all features into column `row` of `gap`, infinite for a wall out of reach."""
+    """Write gaps [m] and gap rates [m/s] of all features, in the state of row `row` of `smooth.y`.
+
+    They go to the same row of `smooth.gap` and `smooth.gap_rate`. Gaps to a wall out of reach are infinite.
+    """
     scene, body = scratch.scene, scratch.body
     x, q, v, m = get_state_row(smooth, row)
     R, _, w, _ = free_angular_motion((x, q, v, m), offset_frame, body)
@@ -76,7 +82,7 @@ def compute_feature_gaps(row, offset_frame, scratch, smooth):
 
 @inlined
 def cubic_minimum(g0, r0, g1, r1, h):
-    """Smallest value on (0, h] of the cubic with these values and slopes at 0 and h."""
+    """Smallest value on (0, h] of the cubic with the value g0 and the slope r0 at 0, and g1 and r1 at h."""
     low = g1
     if r0 < 0.0 and r1 > 0.0 and g0 < math.inf:
         # g0 + r0 t + c t² + k t³; its slope vanishes where 3 k t² + 2 c t + r0 = 0, r0 < 0 at the start.
@@ -92,10 +98,11 @@ def cubic_minimum(g0, r0, g1, r1, h):
 
 @inlined
 def least_gap_margin(h, motion):
-    """Smallest gap of the features that do not act [m] over a step of h.
+    """Smallest gap margin of the features that do not act, over a step of h [s]: (margin [m], slot).
 
-    For a leaving feature this is its height above the place that it left, so that a bounce does not end deeper and gain
-    energy. For one that touches and neither comes nor goes, it is the height above that place plus the slop.
+    The margin of a feature is its smallest gap within the step. For a feature that leaves, it is the height above its
+    gap at the start, so that a bounce does not end deeper and gain energy. For one that touches and neither leaves nor
+    approaches, it is this height plus the gap that counts as touching.
     """
     smooth, thresholds = motion.smooth, motion.thresholds
     least, which = math.inf, -1
@@ -116,7 +123,7 @@ def least_gap_margin(h, motion):
 
 @inlined
 def _cone_excess(j, mu, scratch, contacts):
-    """Tangential force of contact j less μ times its push [N]."""
+    """Excess of contact j alone over its friction cone: tangential force less μ times the normal force [N]."""
     axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
     n, f = axes[0], unstretch_force(row_vector(contacts.force, j, 0), axes, scratch.body)
     p = contacts.normal[j]
@@ -125,7 +132,10 @@ def _cone_excess(j, mu, scratch, contacts):
 
 @inlined
 def _pair_excess(i, j, mu, scratch, contacts):
-    """Excess over the joint cone of two contacts on one wall, however they share the force along their line [N]."""
+    """Excess of the two contacts i and j of one wall over their friction cones together [N].
+
+    It is that of the most favourable distribution of the force along the line between them.
+    """
     body = scratch.body
     axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[i], scratch.scene))
     a, b = row_vector(contacts.arm, i, 0), row_vector(contacts.arm, j, 0)
@@ -148,7 +158,10 @@ def _pair_excess(i, j, mu, scratch, contacts):
 
 @kernel
 def cone_excess(j, scratch, contacts):
-    """Excess [N] of the sticking contact j over its friction cone, together with its wall's other sticking contacts."""
+    """Excess of the sticking contact j over its friction cone [N]; negative inside the cone.
+
+    If exactly two contacts stick at its wall, it is that of both together (`_pair_excess`).
+    """
     wall, other, holding = wall_of(contacts.slot[j], scratch.scene), j, 1
     for k in range(contacts.count):
         if k != j and contacts.sticks[k] and wall_of(contacts.slot[k], scratch.scene) == wall:
@@ -161,7 +174,10 @@ def cone_excess(j, scratch, contacts):
 
 @inlined
 def least_inactive_pull(scratch, motion):
-    """Least pull [N] of a sliding face's affine force at a touching vertex that does not act."""
+    """Margin of the load guard: the smallest pull [N] of a face's affine normal force at a touching inactive vertex.
+
+    Returns (pull, slot of the vertex); the pull is infinite without such a vertex.
+    """
     scene = scratch.scene
     contacts = motion.contacts
     least, which = math.inf, -1
@@ -176,7 +192,7 @@ def least_inactive_pull(scratch, motion):
         for s in range(wall * scene.features, (wall + 1) * scene.features):
             if motion.smooth.is_active[s] or not motion.smooth.gap[ROW_START, s] <= motion.thresholds.touch_gap:
                 continue
-            # The vertices of a face are its corners: the missing one is the sum of its neighbours less the opposite.
+            # The fourth corner of a face is the sum of its two neighbours less the opposite corner.
             p = row_vector(contacts.arm, opposite_face_contact(s, wall, scene, contacts), 0)
             a = b = 0.0
             for i in range(contacts.count):
@@ -195,7 +211,10 @@ def least_inactive_pull(scratch, motion):
 
 @inlined
 def opposite_face_contact(slot, wall, scene, contacts):
-    """Contact of a face of three opposite to the vertex `slot`, in all bits but the face's."""
+    """Index of the acting contact diagonally opposite to the vertex `slot`, on a face with three acting contacts.
+
+    Its vertex number differs from that of `slot` in most bits.
+    """
     best, most = -1, -1
     for i in range(contacts.count):
         if wall_of(contacts.slot[i], scene) == wall:
@@ -208,7 +227,10 @@ def opposite_face_contact(slot, wall, scene, contacts):
 
 @kernel
 def least_force_margin(slack, scratch, motion):
-    """Smallest margin of the force guards, of which `slack` counts as none: (margin, guard, contact or slot)."""
+    """Smallest margin of the force guards push, cone and load: (margin [weights], GUARD_ code, contact or slot).
+
+    `slack` [weights] is added to each margin, so that rounding does not count.
+    """
     contacts, smooth = motion.contacts, motion.smooth
     margin, guard, which = math.inf, GUARD_NONE, -1
     for j in range(contacts.count):
@@ -227,7 +249,7 @@ def least_force_margin(slack, scratch, motion):
 
 @kernel
 def least_start_force_margin(offset_frame, scratch, motion):
-    """Smallest margin of force at START, above rounding."""
+    """Smallest margin of the force guards at the start of the step [weights]."""
     compute_state_rate(ROW_START, 0.0, offset_frame, scratch, motion)
     recover_contact_forces(scratch.body.mu, scratch, motion)
     return least_force_margin(0.0, scratch, motion)[0]
@@ -235,9 +257,9 @@ def least_start_force_margin(offset_frame, scratch, motion):
 
 @kernel
 def least_guard_margin(h, heeds, slack, offset_frame, scratch, motion):
-    """Smallest margin at END, a step of h after START: (margin, guard, contact or slot).
+    """Smallest margin of all guards at the end of a step of h [s], ROW_END: (margin, GUARD_ code, contact or slot).
 
-    `heeds`: True if the force guards count; they end a step when they are below zero by more than `slack`.
+    `heeds` is True if the force guards count. They are used up when their margin is below minus `slack`.
     """
     body = scratch.body
     smooth, contacts, thresholds = motion.smooth, motion.contacts, motion.thresholds

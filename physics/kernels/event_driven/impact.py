@@ -1,4 +1,4 @@
-"""Impulses of impacts, and of leaps where no force is consistent, from contact problems."""
+"""Solve the impulses of impacts, and of velocity jumps where no contact force is consistent (Painlevé's paradox)."""
 
 from __future__ import annotations
 
@@ -23,29 +23,32 @@ from physics.kernels.time_stepping import event_log as ev
 from physics.kernels.time_stepping.impact import set_plastic_targets
 from physics.kernels.time_stepping.tangential_restitution import reject_energy_gain, set_tangential_target
 
-# Impacts in turn at one moment at most. Speeds fall by a constant factor from round to round where they do not end:
-# cos²φ between two plastic walls whose normals are φ apart or π - φ.
+# Largest number of sequential impacts at one moment. If the impacts do not end, speeds fall by a constant factor from
+# round to round: cos²φ between two plastic walls whose normals are at the angle φ or π - φ.
 _MAX_SEQUENTIAL_IMPACTS = 1000
 
-# Residual of a contact problem that is as good as none: rounding of forces that differ by five orders.
+# Relative residual of a contact problem that counts as rounding, of forces that differ by five orders of magnitude.
 _ROUNDING_RESIDUAL = 1.0e-11
 
-# Residual of what is no solution, relative to the largest free contact speed.
+# Relative residual above which impulses are no solution.
 _FAILED_RESIDUAL = 1.0e-3
 
-# No contact alone.
+# Result of `next_sequential_impact`: all contacts collide at once.
 _ALL_AT_ONCE = -1
 
 
 @inlined
 def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
-    """Target velocity of a contact that approaches with `speed`; stores the time of bounces that are too short.
+    """Target normal velocity of a contact that approaches with `speed` [m/s] in an impact.
 
-    A leaving contact may be reversed, to approach at e times its speed and collide next. If it were only stopped, its
-    impulse would do work on it, and the energy would grow.
+    A contact rebounds at e times its speed, unless this is below `thresholds.rest_speed`, which counts as zero. A
+    leaving contact (speed < 0) may be
+    reversed, to approach at e times its speed and collide next. If it were only stopped, its impulse would do work on
+    it, and the energy would grow.
 
-    With the free acceleration b towards the wall a bounce at e times the speed takes t = 2 e speed / b, and all that
-    follow it t e/(1 - e).
+    Bounces too low to be made are left out, and their time is stored in `pace.skipped_bounce_time`. With the free
+    acceleration b towards the wall a bounce takes t = 2 e speed / b, and it and all that follow take t/(1 - e). r and
+    `rate` are the contact's arm and its rate, alpha the angular acceleration.
     """
     thresholds, pace = motion.thresholds, motion.pace
     if speed < -thresholds.rest_speed:
@@ -64,7 +67,7 @@ def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
 
 @inlined
 def takes_part_in_impact(s, motion):
-    """True if feature s takes part in an impact: it touches, or would in no time."""
+    """True if the feature of slot s takes part in an impact: it touches, or will within `simultaneity_time`."""
     smooth, thresholds = motion.smooth, motion.thresholds
     way = -smooth.gap_rate[ROW_START, s] * thresholds.simultaneity_time
     return smooth.gap[ROW_START, s] <= max(thresholds.touch_gap, way)
@@ -72,10 +75,10 @@ def takes_part_in_impact(s, motion):
 
 @inlined
 def next_sequential_impact(body, motion, report):
-    """Feature that collides alone because it approaches fastest; _ALL_AT_ONCE where all collide at once.
+    """Slot of the contact that collides next, the one that approaches fastest; _ALL_AT_ONCE for simultaneous impacts.
 
-    All collide at once also after `_MAX_SEQUENTIAL_IMPACTS` at one moment; the report counts this as a problem not
-    solved to its tolerance.
+    After `_MAX_SEQUENTIAL_IMPACTS` at one moment all contacts collide at once, too. The report then counts a problem
+    not solved to its tolerance.
     """
     if not motion.thresholds.is_sequential:
         return _ALL_AT_ONCE
@@ -92,7 +95,10 @@ def next_sequential_impact(body, motion, report):
 
 @kernel
 def set_up_impact_problem(y, offset_frame, scratch, motion, report):
-    """Write the contact problem of all touching contacts, or of the next in turn; return their number."""
+    """Write the contact problem of an impact in the state y into `scratch`; return its number of contacts.
+
+    It has all touching contacts, or only the next one if impacts are sequential.
+    """
     scene, body = scratch.scene, scratch.body
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
@@ -127,9 +133,10 @@ def _no_tangential_target(*arguments):
 
 @if_law((LAW_TANGENTIAL,), _no_tangential_target)
 def set_tangential_rebound(n, y, offset_frame, motion, scratch):
-    """Set targets along the wall of the single bouncing contact, as `tangential_restitution.set_tangential_targets`.
+    """Set the tangential target of the contact that bounces, if exactly one of the n contacts does.
 
-    A contact with a restitution but without a rebound is a bounce left out; it has no rebound along the wall either.
+    As in `tangential_restitution.set_tangential_targets`, this is for round bodies with tangential restitution. A
+    contact whose bounce is too low to be made has no tangential rebound either.
     """
     bouncing, found = 0, 0
     for i in range(n):
@@ -144,13 +151,16 @@ def set_tangential_rebound(n, y, offset_frame, motion, scratch):
 
 @inlined
 def report_impact_solve(solved, report, scratch):
-    """Add a contact problem, solved to rounding, to the world's report."""
+    """Add `solved`, a result of `solve_contacts` for a problem to be solved to rounding, to the world's report."""
     report_solve(report, scratch.body.world, *solved[2:], max(scratch.settings.tolerance, _ROUNDING_RESIDUAL))
 
 
 @inlined
 def _solve_plastic_impact(n, contact, v, L, solved, P, scratch, report):
-    """Solve the same collision without any rebound; the cost of `solved` goes into the report."""
+    """Solve an impact of n contacts again, without any rebound; `solved`, its result with rebounds, is only reported.
+
+    v and L are velocity and angular momentum before the impact. The result is that of `solve_contacts`.
+    """
     report_impact_solve(solved, report, scratch)
     set_plastic_targets(n, scratch.contacts)
     return solve_contacts(n, contact, v, L, P, scratch)
@@ -158,10 +168,11 @@ def _solve_plastic_impact(n, contact, v, L, solved, P, scratch, report):
 
 @kernel
 def fall_back_to_plastic(n, contact, v, L, solved, P, scratch, report):
-    """Result of `solve_contacts` for a collision; of an impact without rebound if that is no solution.
+    """Solve an impact again, without rebound, if `solved`, the result of `solve_contacts` with rebounds, has failed.
 
-    With friction two contacts may hold any stress along the line between them, and no impulse moves one of them along
-    it. If a rebound along the line is wanted and neither slides, Newton's law and Coulomb's have no common solution.
+    With friction two contacts may hold any stress along the line between them, and then no impulse moves one of them
+    along it. If Newton's law wants a rebound along this line and neither contact slides, it has no common solution with
+    Coulomb's law. The result is that of `solve_contacts`.
     """
     is_asked = False
     for i in range(n):
@@ -173,9 +184,10 @@ def fall_back_to_plastic(n, contact, v, L, solved, P, scratch, report):
 
 @kernel
 def cap_rebound_energy(n, y, contact, offset_frame, solved, P, scratch, contacts, report):
-    """Result of `solve_contacts` for a collision with friction, its rebound limited to the available energy.
+    """Limit the rebound of an impact with friction, so that it gains no energy.
 
-    The impulses in `scratch` are those of the result. See `physics.kernels.contact_law.restitution_energy`.
+    `solved` is the result of `solve_contacts` for the state y before the impact, with the full rebound. The limited
+    result is returned, with its impulses in `scratch.contacts`. See `physics.kernels.contact_law.restitution_energy`.
     """
     body = scratch.body
     _, q, v, L = y
@@ -195,7 +207,11 @@ def cap_rebound_energy(n, y, contact, offset_frame, solved, P, scratch, contacts
 
 @kernel
 def set_up_jump_problem(y, h, offset_frame, scratch, motion):
-    """Write the contact problem of a first-order step over h into `scratch`: (contacts, velocity, angular momentum)."""
+    """Write the contact problem of a first-order step of h [s] from y into `scratch`.
+
+    It has all contacts that may reach their walls within h. Returns (number of contacts, velocity, angular momentum),
+    both at the end of the step, without contact impulses.
+    """
     scene, body = scratch.scene, scratch.body
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
@@ -221,13 +237,16 @@ def set_up_jump_problem(y, h, offset_frame, scratch, motion):
 
 @inlined
 def principal_rotation(y, offset_frame, body):
-    """Rotation matrix of the principal axes at y."""
+    """Rotation matrix of the principal axes of a body in the state y."""
     return qt.to_matrix(principal_attitude(y[1], body, offset_frame))
 
 
 @kernel
 def resolve_impacts(y, t, contact, offset_frame, scratch, motion, records):
-    """State after the impulses of a collision at the time t, of all touching contacts or of the next in turn."""
+    """State after an impact in the state y, t [s] after the start of the call; its impulses are logged and reported.
+
+    All touching contacts collide, or only the next one if impacts are sequential.
+    """
     body = scratch.body
     refresh_loads(y, 0.0, offset_frame, body)
     n = set_up_impact_problem(y, offset_frame, scratch, motion, records.report)
@@ -259,11 +278,15 @@ def resolve_impacts(y, t, contact, offset_frame, scratch, motion, records):
 
 @kernel
 def resolve_inconsistency(y, h, t, contact, offset_frame, scratch, motion, records):
-    """State with the velocities of a first-order step over h from the time t, before a leap."""
+    """State y with new velocities that contacts allow, where no contact force is consistent (Painlevé's paradox).
+
+    They are the velocities at the end of a first-order step of h [s], with inelastic impulses; a leap of this length
+    follows. t is the time after the start of the call.
+    """
     body = scratch.body
     refresh_loads(y, 0.0, offset_frame, body)
     n, v, L = set_up_jump_problem(y, h, offset_frame, scratch, motion)
-    if n > 0:  # there may be nothing in reach
+    if n > 0:  # perhaps no contact is within reach
         P = principal_rotation(y, offset_frame, body)
         solved = solve_contacts(n, contact, v, L, P, scratch)
         report_impact_solve(solved, records.report, scratch)
@@ -283,7 +306,7 @@ def resolve_inconsistency(y, h, t, contact, offset_frame, scratch, motion, recor
 
 @kernel
 def drift_at_velocity(y, h, offset_frame, body):
-    """State after a moment h at constant velocities."""
+    """State after a motion of h [s] from y at constant velocity and angular velocity."""
     x, q, v, L = y
     w = angular_velocity(q, L, body, offset_frame)
     x = (x[0] + h * v[0], x[1] + h * v[1], x[2] + h * v[2])

@@ -1,10 +1,10 @@
-"""Judge steps of a contact mode with unreliable force guards, by a search for the contact mode after each.
+"""Accept or reject steps in a contact mode whose force guards are unreliable.
 
-Where there are more contacts than the body's motion needs, their forces can be distributed in many ways. The linear
-system takes one of them, which may leave a cone, or pull, where others do not. The guard then ends the mode, and the
-search finds the same mode again. In this case force guards are ignored. The mode is searched after every step instead.
-If the acceleration has jumped within the step, another contact mode had begun before its end, and the step is taken
-back and shortened.
+If a body has more contacts than its motion needs, their forces can be distributed in many ways. The linear system takes
+one distribution, which may pull or leave a friction cone where others do not. Then a force guard ends the contact mode,
+and the search finds the same mode again. In this case the force guards of the mode are ignored (*distrusted*), and the
+contact mode is searched after every step instead. If the acceleration has jumped within the step, another contact mode
+had begun before its end; then the step is taken back and shortened.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from physics.kernels.event_driven.contact_candidates import (
 from physics.kernels.event_driven.extrapolated_midpoint import prepare_extrapolated_step, put_state_row
 from physics.kernels.event_driven.workspace import ROW_START, Y_ANGULAR_MOMENTUM, Y_SIZE, Y_VELOCITY
 
-# The first such step in look-aheads, its growth after each that holds, and its share after each that does not: slips
-# begin with no acceleration, so that one found a look-ahead late, 1e-5 of the body's time, is off by the square of it.
+# Length of the first such step in look-aheads, its growth after an accepted step, and its share after a rejected one. A
+# slip begins without acceleration. So a slip found a look-ahead late, 1e-5 of the body's time scale, has an error of
+# the square of that.
 _FIRST_TRUST_STEP = 64.0
 TRUST_GROWTH = 4.0
 TRUST_SHRINK = 0.25
 
-# Change of acceleration that is none, in weights.
+# Change of acceleration that counts as zero, in weights.
 _SAME_ACCELERATION = 1.0e-6
 
 NO_MODE = 0
@@ -34,7 +35,7 @@ NO_MODE = 0
 
 @inlined
 def contact_mode_hash(contacts):
-    """Number that identifies the acting contacts and the sticking ones among them."""
+    """Hash of a contact mode: of the slots of its acting contacts, and of which of them stick."""
     name = 1
     for j in range(contacts.count):
         name = 131 * name + 2 * contacts.slot[j] + contacts.sticks[j]
@@ -49,14 +50,18 @@ def has_trusted_guards(motion):
 
 @inlined
 def distrust_force_guards(nearest, motion):
-    """Ignore the force guards in this contact mode from now on."""
+    """Ignore the force guards of the present contact mode from now on; `nearest` is the smallest look-ahead [s]."""
     motion.pace.distrusted_mode = contact_mode_hash(motion.contacts)
     motion.pace.watched_length = _FIRST_TRUST_STEP * nearest
 
 
 @kernel
 def has_acceleration_jumped(what, y, offset_frame, scratch, motion):
-    """True if the step that led to y went too far: the acceleration there does not continue the earlier one."""
+    """True if the last step, which ended in the state y, was too long: the acceleration has jumped within it.
+
+    `what` is the contact mode found at y, as a MODE_ code. The acceleration in this mode is compared with that at the
+    end of the step.
+    """
     smooth, pace = motion.smooth, motion.pace
     if what in (MODE_REST, MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return False
@@ -74,7 +79,10 @@ def has_acceleration_jumped(what, y, offset_frame, scratch, motion):
 
 @kernel
 def accept_step(what, watched, y, offset_frame, scratch, motion):
-    """Judge the contact mode at y; GOES_BACK if the step that led there was too long and must be repeated."""
+    """Return the contact mode `what`, found at y, or MODE_ROLLBACK if the step that ended at y must be repeated.
+
+    `watched` is the length of this step [s], if it was made without force guards, else 0.
+    """
     if watched > motion.pace.min_look_ahead and has_acceleration_jumped(what, y, offset_frame, scratch, motion):
         return MODE_ROLLBACK
     return what

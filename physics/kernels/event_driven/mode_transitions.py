@@ -1,4 +1,4 @@
-"""Contact mode of a body at the walls: changes are logged as events, and the mode is kept between steps."""
+"""Log changes of a body's contact mode as events, and store the mode from one step to the next."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ WALL_SEPARATED, WALL_SLIPPING, WALL_STICKING = range(3)
 
 @kernel
 def log_mode_changes(scratch, motion, log, counts, t):
-    """Log events of the walls at which the contact changes."""
+    """Log an event for each wall at which the contact mode has changed: touch, release, stick or slip.
+
+    t is the time after the start of the call [s].
+    """
     body = scratch.body
     for wall in range(scratch.scene.walls.shape[0]):
         state = WALL_SEPARATED
@@ -37,7 +40,10 @@ def log_mode_changes(scratch, motion, log, counts, t):
 
 @kernel
 def store_contact_modes(memory, i, scratch, motion):
-    """Store the contact mode and the contact forces for later (`time_stepping.warm_start.store_warm_start`)."""
+    """Store the contact mode and the contact forces of body i in its row of `memory`, for the next step.
+
+    The row has the same form as in time stepping (`time_stepping.warm_start.store_warm_start`).
+    """
     contacts = motion.contacts
     slots = scratch.contacts.slot.shape[0]
     row = WALL_MEMORY_HEAD + slots
@@ -58,12 +64,12 @@ def store_contact_modes(memory, i, scratch, motion):
 
 @inlined
 def load_contact_modes(memory, i, scratch, motion):
-    """Read the contact mode at the end of the last step, and its forces: the opposite of `store_contact_modes`."""
+    """Load the contact mode and the contact forces of body i at the end of the last step from its row of `memory`."""
     row = WALL_MEMORY_HEAD + scratch.contacts.slot.shape[0]
     for s in range(motion.contacts.last_force.shape[0]):
         for c in range(3):
             motion.contacts.last_force[s, c] = memory[i, row + 3 * s + c]
-    total = int(memory[i, 2])  # whether it rested, and base 3 a digit per wall
+    total = int(memory[i, 2])  # a bit that tells whether the body rests, then a digit to base 3 for each wall
     motion.smooth.is_resting = total % 2
     total //= 2
     for wall in range(scratch.scene.walls.shape[0]):

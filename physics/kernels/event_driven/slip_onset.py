@@ -1,15 +1,16 @@
-"""Direction in which a contact begins to slide, at a speed too small to define it.
+"""Find the direction in which a contact begins to slide, at a speed that is too small to define it.
 
-A contact at the limit of friction begins to slide without a jump: the acceleration grows from zero, and the slip |u|
-with the square of the time. Its direction follows the loads at the rate K/|u|, where K is the acceleration that
-friction gives across it for each radian. This is stiff beyond all bounds. But the direction is known without the speed.
-With φ the angle of u and a(φ) the acceleration under the friction opposed to it,
+A contact at the limit of friction begins to slide without a jump: the acceleration grows from zero, and the slip speed
+|u| with the square of the time. Its direction follows the loads at the rate K/|u|, where K is the acceleration that
+friction gives across the slip for each radian. This rate has no bound as |u| vanishes, so the equation of motion is
+stiff. But the direction can be found without the speed. Let φ be the angle of u, d⊥ the unit vector across u, and a(φ)
+the acceleration under friction opposite to u. Then
 
     a(φ)·d⊥ = |u| φ'.
 
-Without the right-hand side this gives the direction that nothing turns; let φ' be the rate at which that one turns. The
-right-hand side is divided by 1 + |u|'/K, since φ lags behind by |u| φ'/K, which grows. The relative error is of the
-order (|u|'/K)².
+With 0 on the right-hand side this gives the direction that loads and friction do not turn. φ' is the rate at which this
+direction turns. The right-hand side is divided by 1 + |u|'/K, since φ lags behind by |u| φ'/K, which grows. The
+relative error is of the order (|u|'/K)². A contact *creeps* while its slip is so slow that this direction holds.
 """
 
 from __future__ import annotations
@@ -23,15 +24,16 @@ from physics.kernels.half_space.contact_point import wall_axes, wall_normal, wal
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, row_vector, times
 
-# Newton's steps for an angle that is known to some 1e-3, the difference for its derivative [rad], and the angle that is
-# none; steps of more than FAR are not of this direction.
+# Newton's method for the angle: largest number of steps (the angle is known to about 1e-3 before), difference for its
+# derivative [rad], tolerance [rad], and largest step [rad]; a larger one leads to another direction.
 _ANGLE_NEWTON_STEPS = 6
 _ANGLE_DIFFERENCE = 1.0e-5
 _ANGLE_TOLERANCE = 1.0e-15
 _MAX_ANGLE_STEP = 0.5
 
-# A contact creeps that is accelerated by less than CREEPING of K, and whose speed is less than SLOWLY of K in the time
-# in which the body turns. A step in which it begins to slide may go PAST times as far.
+# A contact creeps if its slip grows at less than _CREEP_GROWTH of K, and its speed is less than _CREEP_SPEED of K times
+# the time in which the body turns or falls. A step in which it begins to slide may exceed both limits by the third
+# factor.
 _CREEP_GROWTH = 2.0e-3
 _CREEP_SPEED = 1.0e-5
 _CREEP_OVERSHOOT = 2.0
@@ -39,7 +41,7 @@ _CREEP_OVERSHOOT = 2.0
 
 @inlined
 def sliding_velocity(j, scene, contacts):
-    """Tangential velocity of contact j and its size."""
+    """Tangential velocity of the acting contact j, world frame [m/s], and its size."""
     n = wall_normal(scene.walls, wall_of(contacts.slot[j], scene))
     u = row_vector(contacts.velocity, j, 0)
     un = qt.dot(n, u)
@@ -49,7 +51,11 @@ def sliding_velocity(j, scene, contacts):
 
 @inlined
 def contact_velocity_rate(j, P, body, motion):
-    """Rate at which the velocity of contact j changes at START, from `first_rate` and `constraint_error` there."""
+    """Acceleration of the acting contact j at the start of the step, world frame [m/s²].
+
+    It is that without contact, in `constraint_error`, plus that by contact forces, from `first_rate`. P is the matrix
+    of the principal axes.
+    """
     rate, a, torque = motion.smooth.first_rate, body.free_acceleration, body.torque
     T = (
         rate[Y_ANGULAR_MOMENTUM] - torque[0],
@@ -68,7 +74,7 @@ def contact_velocity_rate(j, P, body, motion):
 
 @inlined
 def friction_turn_stiffness(P, scratch, motion):
-    """Turning stiffness K of the only contact, from `first_rate` [m/s²]."""
+    """Turning stiffness K of the only acting contact, from `first_rate`: acceleration across per radian [m/s²]."""
     body = scratch.body
     n = wall_normal(scratch.scene.walls, wall_of(motion.contacts.slot[0], scratch.scene))
     across = qt.cross(n, row_vector(motion.contacts.start_slip_direction, 0, 0))
@@ -82,13 +88,13 @@ def friction_turn_stiffness(P, scratch, motion):
 
 @inlined
 def has_one_sliding_contact(body, contacts):
-    """True if one contact acts, and it slides with friction."""
+    """True if exactly one contact acts, and it slides with friction."""
     return contacts.count == 1 and contacts.sticks[0] == 0 and body.mu > 0.0
 
 
 @inlined
 def _is_small(share, speed, body, motion):
-    """True if the speed of a slip is below `share` times SLOWLY."""
+    """True if the slip speed [m/s] of the only contact is below `share` times the limit of creeping (_CREEP_SPEED)."""
     return (
         speed * (motion.smooth.start_angular_speed + math.sqrt(body.acceleration / body.radius))
         < share * _CREEP_SPEED * motion.contacts.friction_turn_stiffness
@@ -97,13 +103,19 @@ def _is_small(share, speed, body, motion):
 
 @inlined
 def is_creeping(growth, speed, body, motion):
-    """True if a slip that grows at the rate `growth` is so slow, and grows so slowly, that only loads turn it."""
+    """True if the only contact creeps: it begins to slide so slowly that loads alone determine its direction.
+
+    Its slip `speed` [m/s] and the `growth` of this speed [m/s²] must be below their limits.
+    """
     return growth < _CREEP_GROWTH * motion.contacts.friction_turn_stiffness and _is_small(1.0, speed, body, motion)
 
 
 @inlined
 def has_outrun_creep(h, scratch, motion):
-    """True if the only contact begins to slide, and goes beyond creeping in the step of h to END, placed."""
+    """True if the only contact begins to slide in a step of h [s], but is too fast at its end to creep (`is_creeping`).
+
+    `set_contact_kinematics` must have been called for the end of the step.
+    """
     contacts = motion.contacts
     if not has_one_sliding_contact(scratch.body, contacts) or not contacts.is_starting[0]:
         return False
@@ -118,7 +130,10 @@ def has_outrun_creep(h, scratch, motion):
 
 @inlined
 def _slip_accelerations(angle, first, second, axes, P, body, contacts):
-    """Accelerations of contact 0 (across, along) its sliding direction, `angle` from `first` to `second`."""
+    """Accelerations of contact 0 across and along a sliding direction d, under the friction opposite to d [m/s²].
+
+    d is at the `angle` from the unit vector `first` towards `second`; it is written to `slip_direction`.
+    """
     c, s = math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
@@ -132,9 +147,9 @@ def _slip_accelerations(angle, first, second, axes, P, body, contacts):
 
 @kernel
 def set_slip_onset_direction(P, scratch, contacts):
-    """Set `slip_direction` of the only acting contact to the direction of the module, and place it.
+    """Set `slip_direction` of the only acting contact, if it begins to slide, to the direction of the module docstring.
 
-    Several contacts begin to slide in the directions with which they were found.
+    Several contacts begin to slide in the directions that the search of the contact mode has found.
     """
     body = scratch.body
     if not has_one_sliding_contact(body, contacts) or not contacts.is_starting[0]:

@@ -1,4 +1,7 @@
-"""Smooth motion of a contact mode up to the guard that ends it, and a prediction of the next mode."""
+"""Integrate the smooth motion of a contact mode up to the event at which a guard ends it, and locate that event.
+
+States are rows of `motion.smooth.y`: ROW_START at the start of a step, ROW_END at its end.
+"""
 
 from __future__ import annotations
 
@@ -40,22 +43,25 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.state.body import angular_velocity
 
-# Smooth steps at most before the next contact mode is looked for.
+# Largest number of smooth steps of one contact mode.
 _MAX_SEGMENT_STEPS = 10_000
 
-# Trials of the time at which a guard ends a step, those after which what is left must have been halved, and margins
-# that are none: of a gap and of all others.
+# Location of an event: largest number of trials; trials after which the interval is bisected, if they have not halved
+# it; and margins that count as zero, of a gap and of other guards.
 _MAX_LOCATION_TRIALS = 110
 _BISECT_AFTER = 3
 _ZERO_MARGINS = (1.0e-15, 1.0e-13)
 
-# A body whose contacts, when set right, take its speed down to this share of `rest_speed` may be at rest.
+# A body may be at rest if the projection onto its contacts reduces its speed to this share of `rest_speed`.
 _REST_SPEED_SHARE = 1.0e-6
 
 
 @inlined
 def newton_time_to_gap(t, margin, guard, which, body, smooth):
-    """Newton's step to the time at which the gap that was missed at END, t after START, closes; -1 without one."""
+    """Time after the start of the step at which a gap closes, by a Newton step from the end of the step at t [s].
+
+    `margin` is the negative gap margin of slot `which` there. Returns -1 if `guard` is no gap, or the gap grows.
+    """
     if guard != GUARD_GAP or not smooth.gap_rate[ROW_END, which] < 0.0:
         return -1.0
     return t - margin * body.radius / smooth.gap_rate[ROW_END, which]
@@ -63,13 +69,16 @@ def newton_time_to_gap(t, margin, guard, which, body, smooth):
 
 @kernel
 def locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion):
-    """Move the end of the step (END) to the zero of its smallest margin: (its length, guard, contact or slot).
+    """Shorten a step of h [s] to the event at which a guard's margin becomes zero: (length, guard, contact or slot).
 
-    The zero of a gap is found by Newton's steps, other zeros by false position with the Illinois rule. A bisection
-    follows where PATIENCE trials have not halved the interval. NO_STEP is returned where a shorter step fails although
-    the motion should be smooth: the margin changes its sign at a pole (Painlevé), unseen by the whole step.
+    `margin` < 0 is the smallest margin at the end of the step, of `guard` and `which`; `heeds` is true if force guards
+    count. ROW_END becomes the state at the event.
 
-    A force that is positive at the start ends at its zero, not where it is below zero by more than rounding.
+    The zero of a gap is found by Newton steps, other zeros by false position with the Illinois rule. The interval is
+    bisected if `_BISECT_AFTER` trials have not halved it. The guard is GUARD_STEP_FAILED if a shorter step fails,
+    although the motion should be smooth. Then the margin changes its sign at a pole (Painlevé's paradox) within the
+    step. A force margin that is positive at the start ends the step at its zero; otherwise it does so below zero by
+    more than rounding.
     """
     low, high, low_margin, high_margin = 0.0, h, -margin, margin
     slack = FORCE_MARGIN_TOLERANCE
@@ -118,7 +127,10 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion):
 
 @inlined
 def has_slip_stopped(guard, which, scene, motion):
-    """True if the contact that ended a step nearly stands still there, so that the sliding ends there, not before."""
+    """True if the speed guard of contact `which` ended a step, and the contact nearly stands still at its end.
+
+    Then the sliding ends there, and no event within the step is searched.
+    """
     if guard != GUARD_SPEED:
         return False
     return sliding_velocity(which, scene, motion.contacts)[1] <= motion.thresholds.slip_stop_speed
@@ -126,10 +138,10 @@ def has_slip_stopped(guard, which, scene, motion):
 
 @kernel
 def slide_to_stop(which, left, heeds, offset_frame, scratch, motion):
-    """Let contact `which`, which slides slower than the limit at END, slide until it stands still: the time [s].
+    """Make a last short step, in which contact `which`, slower than the limit, slides until it stops: its length [s].
 
-    The direction stays the same. Returns 0 if another event would come within it, or if the contact has only
-    begun to slide.
+    The direction of sliding stays the same. Returns 0, without a step, if another event would come first, or if the
+    contact has only begun to slide. `left` is the time left [s]; `heeds` is true if force guards count.
     """
     body = scratch.body
     contacts, smooth, thresholds = motion.contacts, motion.smooth, motion.thresholds
@@ -159,20 +171,20 @@ def slide_to_stop(which, left, heeds, offset_frame, scratch, motion):
     put_state_row(smooth, ROW_END, end)
     least_guard_margin(
         0.0, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion
-    )  # forces and gaps are those of END again
+    )  # sets forces and gaps to those of ROW_END again
     return 0.0
 
 
 @inlined
 def body_speed_bound(y, offset_frame, body):
-    """Bound of the speed of any point of the body [m/s]."""
+    """Upper bound of the speed of any point of a body in the state y [m/s]."""
     v, w = y[2], angular_velocity(y[1], y[3], body, offset_frame)
     return math.sqrt(qt.dot(v, v)) + body.radius * math.sqrt(qt.dot(w, w))
 
 
 @inlined
 def _begin_next_step(left, offset_frame, scratch, motion):
-    """Length of the next step, from the end of the last one."""
+    """Prepare the next step, which begins at the end of the last one; return its length, at most `left` [s]."""
     smooth = motion.smooth
     for s in range(smooth.is_active.shape[0]):
         gap, rate = smooth.gap[ROW_END, s], smooth.gap_rate[ROW_END, s]
@@ -184,9 +196,11 @@ def _begin_next_step(left, offset_frame, scratch, motion):
 
 @kernel
 def integrate_segment(y, left, offset_frame, scratch, motion):
-    """Smooth motion of the contact mode for `left`, or until a guard ends it: (state, time, guard).
+    """Integrate the smooth motion of the contact mode from y for `left` [s], or until a guard ends it.
 
-    Where the force guards do not count, one step is taken, at most `watched_length` long: its guard is WATCH at least.
+    Returns (state, time [s], GUARD_ code); the code is GUARD_NONE if no guard ended the motion. If the force guards of
+    the mode are ignored (`mode_acceptance`), only one step is made, at most `watched_length` long. It ends with
+    GUARD_WATCH if no other guard ends it.
     """
     body = scratch.body
     smooth, pace, thresholds = motion.smooth, motion.pace, motion.thresholds
@@ -194,7 +208,7 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
     had, still = body_speed_bound(y, offset_frame, body), thresholds.rest_speed
     y = project_state(project_candidate_speeds(y, offset_frame, scratch, motion), offset_frame, scratch, motion)
     if had > still and body_speed_bound(y, offset_frame, body) <= _REST_SPEED_SHARE * still:
-        return y, 0.0, GUARD_SPEED  # the contacts have taken all of it: it may be at rest
+        return y, 0.0, GUARD_SPEED  # the projection has removed all of the speed: the body may be at rest
     put_state_row(smooth, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
     pace.step_length = left if heeds else pace.watched_length
@@ -219,8 +233,8 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
         if guard == GUARD_STEP_FAILED:
             if not h > SEGMENT_SHORTEST_STEP * left:
                 return get_state_row(smooth, ROW_START), t, GUARD_STEP_FAILED
-            # Not `prepare_extrapolated_step` again: it would go by the directions (`slip_direction`) that the trial
-            # ended with. The scale of the errors is that of the start.
+            # `prepare_extrapolated_step` is not called again: it would use the slip directions at the end of the failed
+            # step. The scale of the errors is still that of the start.
             h *= SEGMENT_STEP_CUT
             refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
             continue
@@ -248,7 +262,7 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
 
 @kernel
 def predict_state(y, offset_frame, scratch, motion):
-    """Predicted state of the contact mode after a moment."""
+    """Predict the state after a look-ahead of smooth motion from y in the present contact mode."""
     pace = motion.pace
     put_state_row(motion.smooth, ROW_START, y)
     pace.step_length = pace.look_ahead

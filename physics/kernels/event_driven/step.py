@@ -1,21 +1,25 @@
 """Event-driven scheme, one body at walls: smooth motion between events, each located to rounding.
 
-Each part of a step goes through these stages until its time is used up. y = (x, q, v, L) is the state, M its mass and
-inertia, f the load, J the Jacobian of the contacts, u their velocities, p their impulses, λ their forces.
+A substep goes from event to event through these parts, until its time is used up. y = (x, q, v, L) is the state, M its
+mass and inertia, f the load, J the Jacobian of the contacts, u their velocities, p their impulses, λ their forces.
 
-1. Hold loads         f = f(y, t), anew at every stage of the integration                  `held_loads.refresh_loads`
-2. Find contacts      the contact mode: which touch, and of these which stick and slide    `classify_mode`
+1. Evaluate loads     f = f(y, t), anew at every state of the integration                  `held_loads.refresh_loads`
+2. Find contacts      the contact mode: contacts that touch, and which stick and slide     `classify_mode`
 3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
-4. Limit the stage    the first t at which a guard (gap, push, cone, speed) is zero        `guards`, `time_of_impact`
+4. Limit the motion   the first t at which a guard (gap, push, cone, speed) is zero        `guards`, `time_of_impact`
 5. Integrate          in the air the exact flow to the next wall                           `fly_to_wall`
-                      in contact M v̇ = f + Jᵀ λ with ü_n = 0, ü_t = 0 or λ_t = -μ λ_n d,   `integrate_segment`
+                      in contact M v̇ = f + Jᵀ λ with u̇_n = 0, u̇_t = 0 or λ_t = -μ λ_n d,   `integrate_segment`
                       extrapolated to the tolerance
 6. Correct positions  y is projected onto g_n = 0, u_n = 0 of the contacts                 `project_state`
-7. Rest               nothing changes until the load does                                  `come_to_rest`
+7. Rest               the body stays where it is until its load changes                    `come_to_rest`
 
-A rebound that would be over within a threshold of time is not made. The rest of such a sequence of bounces, t/(1 - e)
-long for a first bounce of length t, is left out, and stated with the event that ends it. Where no mode is consistent
-(Painlevé) the velocities jump: the impulse of an inelastic collision, looked for a moment ahead.
+A rebound below a threshold of speed is not made. It would begin a sequence of bounces, t/(1 - e) long for a first
+bounce of length t. This sequence is left out, and its time is added to that of the event that ends it. If no contact
+mode is consistent (Painlevé's paradox), the velocities jump, by the impulse of an inelastic collision. The body then
+moves on for a moment with these velocities (a leap).
+
+The arguments of the kernels: y is the state of the body, `scratch` its workspace (`time_stepping.workspace`), `motion`
+the scratch memory of this scheme (`event_driven.workspace.Motion`).
 
 References
 ----------
@@ -77,16 +81,17 @@ from physics.kernels.state.body import (
 from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.time_stepping import event_log as ev
 
-# Gaps of this share of what they are the difference of are rounding; see `set_event_thresholds` for _UNSEEN_HOP_GAPS.
+# Gaps below this share of the coordinates that they are differences of are rounding. For the second constant see
+# `set_event_thresholds`.
 _ROUNDING = 1.0e-15
 _UNSEEN_HOP_GAPS = 4.0
 
-# Contacts that touch within this share of the same time, and ten times the tolerance, do so at once: rounding would
-# else make two impacts of that of an edge, with another outcome.
+# Contacts that touch within this time, plus ten tolerances, touch at once, in units of the time in which the body moves
+# by its radius. Otherwise rounding would make two impacts of the impact of an edge, with a different result.
 _SIMULTANEOUS_SHARE = 1.0e-10
 _TINY = 1.0e-300
 
-# Sliding ends at this share of the speed at which a contact that leaves counts as still.
+# Sliding ends at this share of the rest speed, below which a contact does not count as leaving.
 _SLIP_STOP_SHARE = 1.0e-2
 
 _NO_FORCED_MODE = -1
@@ -94,11 +99,13 @@ _NO_FORCED_MODE = -1
 
 @kernel
 def set_event_thresholds(y, h, offset_frame, scratch, motion):
-    """Set the gap and speed that count as zero, and the look-ahead of a mode; problems are solved to rounding.
+    """Set the thresholds of the event-driven scheme for a substep of length h from y, and reset the chatter control.
 
-    The gap that counts as zero covers the rounding of any place that the body may reach within h. The speed that counts
-    as zero lifts a contact by less than `_UNSEEN_HOP_GAPS` such gaps. In a lower bounce the energy error of setting the
-    body down on the wall would be as large as the loss of the impact.
+    `thresholds.touch_gap`, the gap that counts as zero, covers the rounding of any place that the body may reach within
+    h. `thresholds.rest_speed`, the speed that counts as zero, lifts a contact by less than `_UNSEEN_HOP_GAPS` such
+    gaps. In a lower bounce the energy error of setting the body down on the wall would be as large as the loss of the
+    impact.
+    Limits of the contact solver's residual are set to 0, so that problems are solved to rounding.
     """
     body = scratch.body
     thresholds = motion.thresholds
@@ -116,7 +123,10 @@ def set_event_thresholds(y, h, offset_frame, scratch, motion):
 
 @inlined
 def begin_event_substep(y, start, h, offset_frame, memory, scratch, motion):
-    """Prepare a part of length h that begins at the time `start` of the step."""
+    """Prepare a substep of length h [s] from y, which begins `start` [s] after the start of the call.
+
+    Sets clock, loads and thresholds, and loads the contact mode at the end of the last step from `memory`.
+    """
     body = scratch.body
     set_clock(start, body)
     refresh_loads(y, 0.0, offset_frame, body)
@@ -128,9 +138,11 @@ def begin_event_substep(y, start, h, offset_frame, memory, scratch, motion):
 
 @kernel
 def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motion, report):
-    """Find the contact mode from y on; return whether a contact problem was solved: only then may the body rest.
+    """Find the contact mode of the body from y on: (MODE_ code, whether a contact problem was solved for it).
 
-    If the end of the last mode was foretold, the next one is looked for a moment later.
+    If a force guard foretold the end of the last mode (`is_foretold`), the mode is searched at a state predicted a
+    moment later. `watched` is the length of the last step if it has yet to be accepted (`mode_acceptance`), else 0.
+    Only a mode from a contact problem may be MODE_REST.
     """
     seen, later = y, 0.0
     if is_foretold:
@@ -154,7 +166,7 @@ def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motio
 
 @kernel
 def come_to_rest(y, t, offset_frame, scratch, motion, log, counts):
-    """State of a body that rests from the time t on."""
+    """State of a body that rests from the time t on: projected onto its contacts, without velocities; log the event."""
     if motion.smooth.is_resting:
         return y
     motion.smooth.is_resting = 1
@@ -165,7 +177,11 @@ def come_to_rest(y, t, offset_frame, scratch, motion, log, counts):
 
 @kernel
 def integrate_mode(what, y, t, h, flight, scratch, motion, report):
-    """Move, fly or leap from y, at the time t of a part of length h: (state, its duration, guard that ended it)."""
+    """Move the body from y in the contact mode `what`: (new state, duration [s], guard that ended the motion).
+
+    In flight it flies to the next wall, in an inconsistent mode it makes a leap, otherwise it moves smoothly in
+    contact. t is the time in the substep, whose length is h [s].
+    """
     body = scratch.body
     if what == MODE_INCONSISTENT:
         report[body.world, at.FALLBACKS] += 1.0
@@ -182,9 +198,10 @@ def integrate_mode(what, y, t, h, flight, scratch, motion, report):
 
 @kernel
 def advance(y, h, contact, flight, scratch, motion, records, start):
-    """State after h: each turn finds the mode of the body (`forced_mode` if it is known) and follows it.
+    """State after a substep of h [s] from y, which begins `start` [s] after the start of the call.
 
-    A step whose end has to be accepted (`mode_acceptance`) began at `rollback_state` and has the length `watched`.
+    Each round of the loop finds the contact mode (`forced_mode`, if it is known already), and moves the body in it. A
+    step that has yet to be accepted (`mode_acceptance`) began at `rollback_state`, and has the length `watched`.
     """
     body = scratch.body
     pace = motion.pace
@@ -221,7 +238,7 @@ def advance(y, h, contact, flight, scratch, motion, records, start):
                 break
         if mode == MODE_IMPACT:
             records.report[body.world, at.SPLITS] += 1.0
-            pace.chatter_count -= motion.thresholds.is_sequential  # those in turn have a bound of their own
+            pace.chatter_count -= motion.thresholds.is_sequential  # sequential impacts have a limit of their own
             is_foretold = False
             continue
         log_mode_changes(scratch, motion, records.log, records.counts, start + t)
@@ -253,15 +270,19 @@ def _fly_substep(y, h, contact, flight, scratch, motion, records, start):
 
 @if_given("contact.acts", _fly_substep)
 def _take_substep(y, h, contact, flight, scratch, motion, records, start):
-    """State after a substep that begins at the time `start` of the step."""
+    """State after a substep of h [s] from y, which begins `start` [s] after the start of the call.
+
+    In scenes without contact the body flies.
+    """
     return advance(y, h, contact, flight, scratch, motion, records, start)
 
 
 @inlined
 def advance_world(world, grid, bodies, contact, restitution, flight, records, scratch, motion):
-    """Advance each body of a world by `grid.steps` steps, from event to event.
+    """Advance each body of a world by `grid.steps` steps, from event to event; write states, report and events.
 
-    Events go to `records.log`, their number to `records.counts`; otherwise as in time stepping.
+    Events go to `records.log`, their number to `records.counts`. A body whose new state is not finite keeps the old
+    one, and the report counts a fault. The groups of arguments are those of `physics.kernels.state.groups`.
     """
     body = scratch.body
     h, count = grid.h, bodies.shapes.shape[0]
@@ -295,7 +316,10 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_events(queue, grid, bodies, contact, restitution, flight, records, scratch, motions):
-    """Advance the worlds that no other thread has taken, from event to event: `advance_world`."""
+    """Advance all worlds that the calling thread can take from `queue`, from event to event (`advance_world`).
+
+    `scratch` and `motions` are the thread's workspace and `Motion`, with arrays of one record.
+    """
     motion = Motion(
         motions.thresholds[0],
         motions.pace[0],

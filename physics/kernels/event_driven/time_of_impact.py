@@ -1,23 +1,24 @@
-"""Flight up to the first contact of a feature with a wall, whose time is found to rounding and never missed.
+"""Fly a body up to its first contact with a wall, whose time is found to rounding and never missed.
 
-Over a time τ_h the gap of a feature is bounded below by
+Let g be the gap of a feature, with its derivatives g' and g'', and C a bound of its third derivative over the time τ_h.
+Then the gap after the time τ <= τ_h is at least
 
-    g + g' τ + (g'' - C τ_h / 3) τ²/2,    τ <= τ_h,
+    g + g' τ + (g'' - C τ_h / 3) τ²/2.
 
-where C bounds its third derivative. The first zero of that parabola comes no later than an impact could, so the body
-may fly up to it; from there again, until the zero is reached. The bound is exact on a parabola, and near a wall the
-steps converge like Newton's with the third derivative neglected (conservative advancement, Mirtich 1996, to second
-order).
+The first zero of this parabola comes no later than an impact. So the body flies up to it, and the bound is computed
+again, until a wall is reached (conservative advancement, Mirtich 1996, to second order). The bound is exact if the gap
+is a parabola. Near a wall the steps converge like Newton's method with the third derivative neglected.
 
-A body turns with |ω|² <= J_max ω·L, and √(ω·L) grows by |τ| √J_max at most: over τ_h, |ω| <= Ω = √(J_max ω·L) +
-J_max |τ| τ_h. In Euler's equations J_i (I_j - I_k) is between -1 and 1 (the triangle inequality of moments of inertia),
-so that |α| <= A = J_max |τ| + Ω² and |dα/dt| <= B = (1 + √2) Ω A + J_max Ω |τ|. The third derivative of a point at
-distance ρ is then at most ρ (B + 3 Ω A + Ω³). A sphere's gap has none. The support function of an ellipsoid,
-s = |D Rᵀ n|, has derivatives that exceed those of a point at its largest semi-axis by at most 3 κ², κ the ratio of its
-largest to its smallest.
+The bound C follows from bounds of the rotation. Let J_max be the largest inverse moment and T the torque. Then
+|ω|² <= J_max ω·L, and √(ω·L) grows at most at the rate |T| √J_max. So |ω| <= Ω = √(J_max ω·L) + J_max |T| τ_h over
+τ_h. In Euler's equations J_i (I_j - I_k) is between -1 and 1 (triangle inequality of moments of inertia). So the
+angular acceleration α has |α| <= A = J_max |T| + Ω² and |dα/dt| <= B = (1 + √2) Ω A + J_max Ω |T|. For a point at the
+distance ρ, C = ρ (B + 3 Ω A + Ω³). For a sphere C = 0. The support function of an ellipsoid, s = |D Rᵀ n|, has
+derivatives that exceed those of a point at its largest semi-axis by at most the factor 3 κ², with the ratio κ of its
+largest semi-axis to its smallest.
 
-In a field there is no such bound: the body moves as it does in contact, by smooth steps with gaps and their rates
-watched at both ends (`integrate_segment`), unless it felt nothing of any field on its way.
+In a force field there is no such bound. There the body moves as in contact, by smooth steps with tests of gaps and gap
+rates at both ends (`integrate_segment`). If no field acted on its way, the exact flight is used instead.
 """
 
 from __future__ import annotations
@@ -57,23 +58,23 @@ from physics.kernels.state.body import angular_velocity
 from physics.kernels.state.groups import FlightSwitches
 from physics.kernels.state.layout import ELLIPSOID, SPHERE, WALL_OFFSET
 
-# Advances towards one impact at most; six are usual, more where a body grazes a wall.
+# Largest number of advances towards one impact; six are usual, more if a body grazes a wall.
 _MAX_ADVANCES = 200
 
-# An advance by less than this share of the time left is the last one: what it leaves is of third order in it.
+# An advance by less than this share of the time left is the last one, since the remaining time is of third order in it.
 _LAST_ADVANCE_SHARE = 1.0e-13
 
-# The time over which the parabola bounds the gap is doubled as long as it is not used up: from the first guess, which
-# is as short as the bound of the third derivative is loose, by as much as rounding tells apart at most.
+# Largest number of doublings of τ_h, the time over which the parabola bounds the gap. It is doubled until the root of
+# the parabola comes before its end. With a loose bound of the third derivative the first guess is short.
 _MAX_HORIZON_DOUBLINGS = 52
 
-# Extrapolated steps of one flight at most, those that are refused included.
+# Largest number of extrapolated steps of one flight, failed ones included.
 _MAX_FLIGHT_STEPS = 10_000
 
 
 @inlined
 def parabola_root(g, r, b):
-    """First positive zero of g + r τ + b τ²/2 for g >= 0; infinite if there is none."""
+    """First zero τ >= 0 of the parabola g + r τ + b τ²/2, with g >= 0; infinite if there is none."""
     if b == 0.0:
         return g / -r if r < 0.0 else math.inf
     disc = r * r - 2.0 * b * g
@@ -88,7 +89,10 @@ def parabola_root(g, r, b):
 
 @inlined
 def gap_safe_time(g, r, b, third, horizon):
-    """Time within which a gap g with rate r, second derivative b and third at most `third` cannot close."""
+    """Time [s], at most `horizon`, within which a gap cannot close.
+
+    The gap is g [m], with the rate r and the second derivative b; `third` bounds the third one [m/s³].
+    """
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
     for _ in range(_MAX_HORIZON_DOUBLINGS):
         over = min(horizon, 2.0 * t)
@@ -102,7 +106,7 @@ def gap_safe_time(g, r, b, third, horizon):
 
 @kernel
 def gap_jerk_bound(y, left, offset_frame, body):
-    """Bound of the third derivative of any feature's gap over the time `left` [m/s³]."""
+    """Upper bound of the third derivative of any feature's gap in a flight of `left` [s] from y [m/s³]."""
     if body.shape == SPHERE:
         return 0.0
     t = math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
@@ -120,10 +124,10 @@ def gap_jerk_bound(y, left, offset_frame, body):
 
 @kernel
 def safe_flight_time(y, left, third, assured, offset_frame, scratch, thresholds):
-    """Time within which no feature at y can reach a wall, at most `left`.
+    """Time of free flight from y, at most `left` [s], within which no feature can reach a wall.
 
-    Features that touch and do not approach stay away for `assured_time` at least: just after a push has ended, the
-    acceleration that lifts them is still zero.
+    `third` is the bound of `gap_jerk_bound`. Features that touch and do not approach count as clear for at least
+    `assured` [s]: just after a contact has stopped pushing, the acceleration that lifts it is still zero.
     """
     scene, body = scratch.scene, scratch.body
     x, v = y[0], y[2]
@@ -150,14 +154,17 @@ def safe_flight_time(y, left, third, assured, offset_frame, scratch, thresholds)
 
 @inlined
 def has_torque(body):
-    """True if a torque acts."""
+    """True if a torque acts on the body."""
     t = body.torque
     return t[0] != 0.0 or t[1] != 0.0 or t[2] != 0.0
 
 
 @kernel
 def integrate_free_flight(y, t, offset_frame, scratch, motion):
-    """Free motion under a torque or in fields over t by extrapolated steps: (state, time left)."""
+    """Fly over t [s] from y under a torque or in force fields, by extrapolated steps: (state, time left [s]).
+
+    Time is left if the allowed number of steps was not enough.
+    """
     smooth = motion.smooth
     put_state_row(smooth, ROW_START, y)
     left, tries = t, 0
@@ -179,7 +186,7 @@ def integrate_free_flight(y, t, offset_frame, scratch, motion):
 
 @inlined
 def count_unresolved_flight(report, body):
-    """Count a flight that extrapolated steps cannot follow; with fields, they are not resolved."""
+    """Count in the report a flight that extrapolated steps cannot follow; in fields also as unresolved motion."""
     report[body.world, at.UNRESOLVED] += 1.0
     if has_fields(body):
         report[body.world, at.UNRESOLVED_MOTION] += 1.0
@@ -187,10 +194,10 @@ def count_unresolved_flight(report, body):
 
 @kernel
 def fly_freely(y, t, gyroscopic, offset_frame, scratch, motion, report):
-    """State after the time t without contact.
+    """State after a flight of t [s] from y without contact.
 
-    A body that turns or swings faster than extrapolated steps can follow moves by time stepping for the rest of t,
-    which is reported.
+    If extrapolated steps cannot follow a body that turns or swings fast, it moves by time stepping for the rest of t,
+    and this is reported.
     """
     body = scratch.body
     if has_torque(body) or has_fields(body):
@@ -208,9 +215,9 @@ def fly_freely(y, t, gyroscopic, offset_frame, scratch, motion, report):
 
 @kernel
 def fly_to_wall(y, left, gyroscopic, offset_frame, scratch, motion, report):
-    """Fly for `left` or until a feature reaches a wall: (state, time, whether the flight was found).
+    """Fly from y for `left` [s], or until a feature reaches a wall: (state, time [s], whether the flight succeeded).
 
-    The flight may end earlier, if a feature flies so close along a wall that `_MAX_ADVANCES` steps did not decide: no
+    The flight ends earlier if a feature flies so close along a wall that `_MAX_ADVANCES` advances are not enough. So no
     wall is missed.
     """
     body = scratch.body

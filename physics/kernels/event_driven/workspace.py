@@ -1,11 +1,9 @@
-"""Scratch memory of one thread for the event-driven scheme: acting contacts, their forces, rows of smooth motion.
+"""Scratch memory of one thread for the event-driven scheme, `motion`: thresholds, contacts, forces, smooth motion.
 
-`Motion` is a named tuple of groups, one for each part of a step. Each is a record whose fields are named in a function
-below, since their sizes depend on the walls and on the features of a body: `contacts` at most act at once, `slots` are
-all features at all walls, and there are `unknowns` = 3 contacts.
-
-Besides the workspace of `physics.kernels.time_stepping.workspace`, which the impact solver shares with the
-time-stepping scheme.
+`Motion` is a named tuple of groups. Each group is a record; a function below gives its fields, since their sizes depend
+on the numbers of walls and features. There are at most `contacts` acting contacts, `slots` features at all walls
+together, and `unknowns` = 3 contacts. The scheme also uses the workspace `scratch` of
+`physics.kernels.time_stepping.workspace`, mainly for the contact solver.
 """
 
 from __future__ import annotations
@@ -22,22 +20,22 @@ FACE_VERTICES = 4
 # Columns of a smooth state: position, quaternion, velocity, angular momentum.
 Y_POSITION, Y_QUATERNION, Y_VELOCITY, Y_ANGULAR_MOMENTUM, Y_SIZE = 0, 3, 7, 10, 13
 
-# Rows of `y`: where the step starts, where it ends, two of the midpoint rule.
+# Rows of `y`: states at the start and at the end of the step, and two states of the midpoint rule.
 ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 
-# At most so many midpoint rules are extrapolated, with 2, 4, 6, ... parts: order 16.
+# Largest number of midpoint rules that are extrapolated, with 2, 4, 6, ... parts: order 16.
 MAX_MIDPOINT_RULES = 8
 
 
 class Motion(NamedTuple):
-    """Groups of the scratch memory: arrays of one record in Python, records in a kernel."""
+    """Groups of the event-driven scheme's scratch memory: arrays of one record in Python, records in a kernel."""
 
-    thresholds: np.ndarray  # what counts as zero and as one
-    pace: np.ndarray  # when the next contact mode is looked for, and how far a step is trusted
-    contacts: np.ndarray  # contacts that act: kinematics, forces and their margins
+    thresholds: np.ndarray  # gaps, speeds and times that count as zero
+    pace: np.ndarray  # look-ahead to the next contact mode, leaps, and lengths of steps
+    contacts: np.ndarray  # acting contacts: kinematics, forces and their margins
     unknowns: np.ndarray  # unknowns of the contact forces, and their equations
-    candidates: np.ndarray  # contacts that a contact mode may have
-    smooth: np.ndarray  # smooth step: gaps, stages, scales
+    candidates: np.ndarray  # candidate contacts of the search for a contact mode
+    smooth: np.ndarray  # smooth step: states, rates, gaps, scales
 
 
 def _threshold_fields() -> list[tuple]:
@@ -55,18 +53,18 @@ def _threshold_fields() -> list[tuple]:
 def _pace_fields() -> list[tuple]:
     f, i = np.float64, np.int64
     return [
-        ("look_ahead", f),  # time by which the next contact mode is looked for [s]
-        ("min_look_ahead", f),  # the least of these [s]
-        ("assured_time", f),  # time for which contacts that a guard has let go are known to stay open [s]
-        ("next_leap", f),  # length of the next leap over events that crowd [s] (`chatter_control`)
-        ("chatter_start", f),  # since when events crowd [s]
-        ("chatter_count", i),  # events since then
-        ("sequential_impacts", i),  # impacts in turn so far at this moment
-        ("skipped_bounce_time", f),  # time that a sequence of bounces would have taken on [s]
-        ("step_length", f),  # length of the last smooth step [s]
-        ("ended_mode", i),  # the contact mode that a guard of force has ended
-        ("distrusted_mode", i),  # the contact mode whose guards of force say nothing; see `mode_acceptance`
-        ("watched_length", f),  # length of a step without such guards [s]
+        ("look_ahead", f),  # time after an event at which the next contact mode is searched [s]
+        ("min_look_ahead", f),  # smallest look-ahead [s]
+        ("assured_time", f),  # time for which contacts that a guard has opened are known to stay open [s]
+        ("next_leap", f),  # length of the next leap, after chatter [s] (`chatter_control`)
+        ("chatter_start", f),  # start of the period in which events are counted [s]
+        ("chatter_count", i),  # events in this period
+        ("sequential_impacts", i),  # sequential impacts so far at this moment
+        ("skipped_bounce_time", f),  # time that the bounces left out would have taken [s]
+        ("step_length", f),  # length suggested for the next smooth step [s]
+        ("ended_mode", i),  # hash of the contact mode that a force guard has ended
+        ("distrusted_mode", i),  # hash of the contact mode whose force guards are ignored (`mode_acceptance`)
+        ("watched_length", f),  # length of the next step without force guards [s]
         ("end_rate", f, (Y_SIZE,)),  # rate of change at the end of such a step
     ]  # fmt: skip
 
@@ -80,36 +78,36 @@ def _contact_fields(contacts: int, slots: int) -> list[tuple]:
         ("slip_direction", f, (n, 3)),  # direction of sliding
         ("start_slip_direction", f, (n, 3)),  # the one at the start of the step
         ("is_starting", i, (n,)),  # 1: the contact was at rest at the start of the step, or nearly
-        ("slip_turn_rate", f),  # rate at which the direction turns in which the only contact begins to slide [rad/s]
-        ("friction_turn_stiffness", f),  # change by friction of its acceleration across, for each radian [m/s²]
-        ("start_slip_speed", f),  # slip speed of the only contact at the start of the step [m/s]
-        ("slip_growth", f),  # rate at which that speed grows [m/s²]
+        ("slip_turn_rate", f),  # rate at which the slip direction of a single contact turns at its onset [rad/s]
+        ("friction_turn_stiffness", f),  # acceleration of a single contact across its slip, per radian [m/s²]
+        ("start_slip_speed", f),  # slip speed of a single contact at the start of the step [m/s]
+        ("slip_growth", f),  # growth of this speed [m/s²]
         ("arm", f, (n, 3)),  # contact point relative to the centre of mass [m]
-        ("velocity", f, (n, 3)),  # of the body there [m/s]
-        ("constraint_error", f, (n, 3)),  # what the unknowns are to cancel: acceleration, velocity or gap
-        ("force", f, (n, 3)),  # [N]
-        ("normal", f, (n,)),  # of it, along the normal [N]
-        ("margin", f, (3, 2, n)),  # of push and cone at the ends of a step and inside; see `force_minima` [weights]
-        ("margin_rate", f, (2, n)),  # their rates of change at its start
+        ("velocity", f, (n, 3)),  # velocity of the body at the contact point [m/s]
+        ("constraint_error", f, (n, 3)),  # acceleration, velocity or gap that the unknowns are to cancel
+        ("force", f, (n, 3)),  # contact force, world frame [N]
+        ("normal", f, (n,)),  # normal component of the force [N]
+        ("margin", f, (3, 2, n)),  # push and cone margins at both ends of a step and inside (`force_minima`) [weights]
+        ("margin_rate", f, (2, n)),  # rates of change of these margins at the start
         ("first_unknown", i, (n,)),  # first unknown of the contact alone
-        ("patch", i, (n,)),  # first of its wall's three normal forces; NO_PATCH (`contact_forces`): one of its own
+        ("patch", i, (n,)),  # first of its wall's three normal unknowns, or NO_PATCH (`contact_forces`)
         ("patch_coordinate", f, (n, 2)),  # coordinates in the patch, in radii
-        ("given_force", f, (n, 3)),  # part of its force that is given, along the wall's axes [N]
-        ("last_force", f, (slots, 3)),  # force of every feature when it was last known, along the wall's axes [N]
-        ("rebound", f, (3 * slots,)),  # impulses of a rebound that there is not enough energy for [N s]
+        ("given_force", f, (n, 3)),  # given part of the force, along the wall's axes [N]
+        ("last_force", f, (slots, 3)),  # last known force of every feature, along the wall's axes [N]
+        ("rebound", f, (3 * slots,)),  # impulses of a full rebound, where it would gain energy [N s]
     ]  # fmt: skip
 
 
 def _unknown_fields(unknowns: int) -> list[tuple]:
     f, i, m = np.float64, np.int64, unknowns
     return [
-        ("given_wrench", f, (2, 3)),  # force and moment of the shares, which the unknowns add to
+        ("given_wrench", f, (2, 3)),  # total force and moment of the given forces, which the unknowns add to
         ("column_force", f, (m, 3)),  # force per unknown
         ("column_moment", f, (m, 3)),  # moment per unknown about the centre of mass
         ("row", f, (m, 3)),  # direction of the constraint
-        ("row_moment", f, (m, 3)),  # its moment
-        ("is_skew", i),  # 1: some contact pushes along another line than its row
-        ("independent_row", i, (m,)),  # rows that are equations
+        ("row_moment", f, (m, 3)),  # moment of this direction about the centre of mass
+        ("is_skew", i),  # 1: some contact has a force in another direction than its row
+        ("independent_row", i, (m,)),  # indices of linearly independent rows
         ("matrix", f, (m, m + 1)),
         ("order", i, (m,)),
         ("rhs", f, (m,)),  # right-hand sides
@@ -122,9 +120,9 @@ def _candidate_fields(contacts: int) -> list[tuple]:
     return [
         ("count", i),  # contacts that touch and do not leave
         ("slot", i, (n,)),  # wall * features + feature
-        ("state", i, (n,)),  # open, held, sliding
+        ("state", i, (n,)),  # CANDIDATE_OPEN, CANDIDATE_STICKING or CANDIDATE_SLIDING
         ("direction", f, (n, 3)),  # direction of sliding
-        ("is_fresh", i, (n,)),  # slides from rest
+        ("is_fresh", i, (n,)),  # 1: has no slip yet; if it slides, it begins to slide
         ("changes", i, (n,)),  # changes of its state in this search
     ]  # fmt: skip
 
@@ -132,24 +130,27 @@ def _candidate_fields(contacts: int) -> list[tuple]:
 def _smooth_fields(walls: int, slots: int) -> list[tuple]:
     f, i = np.float64, np.int64
     return [
-        ("is_resting", i),
-        ("wall_state", i, (walls,)),  # what the body did at each wall after the last event
-        ("gap", f, (2, slots)),  # of every feature, at the start and at the end of the step [m]
-        ("gap_rate", f, (2, slots)),  # [m/s]
-        ("is_active", i, (slots,)),
+        ("is_resting", i),  # 1: the body rests
+        ("wall_state", i, (walls,)),  # contact at each wall after the last event (`mode_transitions`)
+        ("gap", f, (2, slots)),  # gap of every feature, at the start and at the end of the step [m]
+        ("gap_rate", f, (2, slots)),  # rates of these gaps [m/s]
+        ("is_active", i, (slots,)),  # 1: the feature acts
         ("weight", f),  # scale of the forces [N]
         ("start_angular_speed", f),  # angular speed at the start of the step [rad/s]
-        ("y", f, (ROW_COUNT, Y_SIZE)),
-        ("rate", f, (Y_SIZE,)),
-        ("first_rate", f, (Y_SIZE,)),
-        ("last_rate", f, (Y_SIZE,)),
-        ("scale", f, (Y_SIZE,)),
-        ("extrapolation_table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),
+        ("y", f, (ROW_COUNT, Y_SIZE)),  # states
+        ("rate", f, (Y_SIZE,)),  # rate of change of the last evaluated state
+        ("first_rate", f, (Y_SIZE,)),  # rate of change at the start of the step
+        ("last_rate", f, (Y_SIZE,)),  # rate of change at the end of the step
+        ("scale", f, (Y_SIZE,)),  # units of the errors of the state
+        ("extrapolation_table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),  # a row of Neville's table
     ]  # fmt: skip
 
 
 def make_motion(wall_count: int, features: int, is_sequential: bool) -> Motion:
-    """Make the scratch for bodies with `features` contact features each against `wall_count` walls."""
+    """Make the scratch memory `Motion` for bodies with `features` contact features each (8 or 1) at `wall_count` walls.
+
+    With `is_sequential` contacts of one moment collide one after the other, otherwise simultaneously.
+    """
     walls = max(wall_count, 1)
     contacts, slots = walls * (FACE_VERTICES if features == VERTEX_COUNT else 1), walls * features
     groups = (

@@ -1,1 +1,1 @@
-"""Motion of a body without contact: the exact flow, and the textbook integrators."""
+"""Motion of a body without contact: the exact flow, and the textbook integrators (Euler, midpoint, Runge-Kutta)."""

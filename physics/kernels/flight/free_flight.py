@@ -1,4 +1,4 @@
-"""Free motion of one body: parabola and exact rotation, and the textbook schemes."""
+"""Motion of one body without contact over a time h: parabola and exact rotation, or a textbook scheme."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from physics.kernels.state.body import body_attitude, principal_attitude
 
 @inlined
 def drift_attitude(q, L, body, h, gyroscopic, offset_frame):
-    """Attitude after h with constant angular momentum L, exact to rounding."""
+    """Attitude, as a quaternion, of a body that turns freely from q over the time h [s], exact to rounding.
+
+    Its angular momentum L is constant. The switch `gyroscopic` is None if all moments of inertia are equal.
+    """
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return q
     if gyroscopic is None:
@@ -22,10 +25,11 @@ def drift_attitude(q, L, body, h, gyroscopic, offset_frame):
 
 @inlined
 def fly(y, body, h, gyroscopic, offset_frame):
-    """State (x, q, v, L) after h under the constant acceleration and torque of the step.
+    """State (x, q, v, L) after a flight of h [s] from y under constant acceleration and torque.
 
-    The parabola is exact. Without torque so is the rotation; with torque it is the Strang splitting of second
-    order: half a free rotation, the angular impulse, half a free rotation.
+    These are `body.free_acceleration` and `body.torque`. The parabola is exact. The rotation is exact, too, without
+    torque. With torque it is the Strang splitting of second order: half a free rotation, the angular impulse, half a
+    free rotation.
     """
     x, q, v, L = y
     a, torque = body.free_acceleration, body.torque
@@ -49,7 +53,10 @@ def _fly_exactly(y, h, flight, body):
 
 @if_given("flight.scheme", _fly_exactly)
 def integrate_flight(y, h, flight, body):
-    """Free motion over h: the exact flow, or a textbook scheme (codes of `physics.kernels.flight.integrators`)."""
+    """State (x, q, v, L) after a flight of h [s] from y: by a textbook scheme if `flight.scheme` is on, else by `fly`.
+
+    `flight` is a `FlightSwitches`. Its scheme is a code of `physics.kernels.flight.integrators`.
+    """
     x, q, v, L = y
     q = principal_attitude(q, body, flight.offset_frame)
     zero = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Flow of the free rigid body, exact to rounding at any spin rate and without elliptic functions.
+"""Rotate a free rigid body over a time h, exact to rounding at any spin rate and without elliptic functions.
 
 Let m be the angular momentum in the principal frame, J the inverse principal
 moments, a = (J3 - J2, J1 - J3, J2 - J1). Euler's equations are m1' = a1 m2 m3
@@ -30,13 +30,14 @@ coefficients below were derived in exact rational arithmetic by matching the
 Taylor series of the flow; `tests/kernels/test_rotation.py` derives them anew.
 From e0 e follows e0² = (1 + √(1 - 4 |e0 e|²)) / 2.
 
-A step whose angle h |ω| exceeds `PART_ANGLE_LIMIT` is cut into equal parts. One of many turns is taken by periods of m,
-which is made of elliptic functions: with the axes in the order of their moments, so that 2 is the middle one,
+A step whose angle h |ω| exceeds `PART_ANGLE_LIMIT` is cut into equal parts. A step of many turns is made by periods of
+m. With the axes in the order of their moments, so that axis 2 is the middle one, the period is
 
     T = 4 K(k) / √max(P, Q) = 2π / agm(√max(P, Q), √|P - Q|).
 
-Where m returns, only a turn about the constant L is left of the rotation. It is found for one period by parts, and
-multiplied by the number of periods. Where m stays as it is, the body turns about L at ω·L/|L| = 2E/|L|.
+After a period m is the same again, so the body has turned about the constant L. The angle of this turn is found for one
+period, by parts, and multiplied by the number of periods. Where m is constant, the body turns about L at the rate
+ω·L/|L| = 2E/|L|.
 
 References
 ----------
@@ -75,27 +76,28 @@ TINY_SQUARE = 2.5e-6
 # than 0.037 (4e-4)⁴ = 1e-15 of its size, and the attitude, where m(h) enters times θ/4, by less than 1e-17.
 SHORT_SERIES = 4.0e-4
 
-# Turns with more parts than this, 6e5 rad in one period of the momentum or without a whole one, are those of bodies
-# whose moments are nearly equal. They are taken as if m stayed as it is: that keeps energy and momentum.
+# A turn that needs more parts than this, 6e5 rad within a period of m or with less than two periods, is that of a body
+# whose moments are nearly equal. It is made as if m were constant, which keeps energy and momentum.
 PARTS_LIMIT = 1.0e7
 
-# Beyond this angle [rad] a step of at least two periods is taken by periods. An error of one period's turn, a few 1e-16
+# Beyond this angle [rad] a step of at least two periods is made by periods. An error of one period's turn, a few 1e-16
 # rad per part, counts once per period: less than EPS h |ω|, which the rounding of h alone makes.
 MANY_TURNS = 50.0
 
 
 def write_attitude_series(J1, J2, J3, out):
-    """Coefficients of the series s and d, of one body or of many at once.
+    """Write the coefficients of the series s and d of the module docstring, for one body or for many at once.
 
-    For the bodies of a new world it runs without a kernel, which would have to be compiled first; `attitude_series` is
-    the kernel.
+    New worlds call this Python function, so that no kernel has to be compiled first. `attitude_series` is the same
+    function as a kernel.
 
     Parameters
     ----------
     J1, J2, J3 : float or (n,) float64
         Inverse principal moments of inertia [1/(kg m²)].
     out : (SERIES_SIZE,) or (SERIES_SIZE, n) float64, out
-        s: (1,0) (0,1) | (2,0) (1,1) (0,2) | (3,0) (2,1) (1,2) (0,3), powers of (|m|², 2E); then d likewise.
+        Nine coefficients of s, then nine of d. The powers of (|m|², 2E) that they belong to are
+        (1,0) (0,1) | (2,0) (1,1) (0,2) | (3,0) (2,1) (1,2) (0,3).
     """
     e1 = J1 + J2 + J3
     e2 = J1 * J2 + J2 * J3 + J3 * J1
@@ -125,11 +127,11 @@ attitude_series = kernel(write_attitude_series)
 
 @inlined
 def _half_angle(x, square):
-    """(e0, 1/e0) from x = |e0 e|², that is e0² = (1 + √(1 - 4x)) / 2, by their series.
+    """Scalar part e0 of a unit quaternion (e0, e), and 1/e0, from x = |e0 e|²: e0² = (1 + √(1 - 4x)) / 2.
 
-    Series replace two square roots, which would follow each other in the longest chain of the step. 4x = sin² of an
-    angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4, and the first neglected terms, 29 x⁶ of e0 and 51 x⁶ of 1/e0, are
-    under 3e-17.
+    `square` is the squared angle of the rotation [rad²]. Power series replace two square roots, one after the other,
+    which would take longer. 4x is sin² of an angle up to `PART_ANGLE_LIMIT`, so x < 9.0e-4. The first neglected terms,
+    29 x⁶ of e0 and 51 x⁶ of 1/e0, are under 3e-17.
     """
     xx = x * x
     if square > TINY_SQUARE:
@@ -143,7 +145,11 @@ def _half_angle(x, square):
 
 @inlined
 def _part(q, m_body, J_body, c, mm, energy2, square, h):
-    """Part of the flow: (quaternion, body momentum) after h, for an angle below the limit, of that `square`."""
+    """Quaternion and body momentum after a free rotation over h [s], by an angle of at most `PART_ANGLE_LIMIT`.
+
+    m_body is the momentum m in the principal frame, J_body the inverse moments and c the coefficients of
+    `attitude_series`. mm is |m|², energy2 is 2E, and `square` is a bound of the squared angle of the turn [rad²].
+    """
     J1, J2, J3 = J_body
     m1, m2, m3 = m_body
     a1, a2, a3 = J3 - J2, J1 - J3, J2 - J1
@@ -203,7 +209,10 @@ def _part(q, m_body, J_body, c, mm, energy2, square, h):
 
 @kernel
 def momentum_period(m, J):
-    """Period [s] of the momentum m in the principal frame; inf on the separatrix, where it does not return."""
+    """Period [s] of the momentum m in the principal frame, for inverse moments J.
+
+    It is infinite on the separatrix, where m never returns.
+    """
     one, two, three = (J[0], m[0] * m[0]), (J[1], m[1] * m[1]), (J[2], m[2] * m[2])
     if one[0] > two[0]:
         one, two = two, one
@@ -224,21 +233,27 @@ def momentum_period(m, J):
 
 @inlined
 def _is_steady(m, J):
-    """True if the momentum m in the principal frame is constant, without gyroscopic torque."""
+    """True if the momentum m in the principal frame is constant, because the gyroscopic torque is zero."""
     first, second, third = (J[2] - J[1]) * m[1] * m[2], (J[0] - J[2]) * m[2] * m[0], (J[1] - J[0]) * m[0] * m[1]
     return first == 0.0 and second == 0.0 and third == 0.0
 
 
 @inlined
 def _turn_steadily(q, L, mm, energy2, h):
-    """Attitude after h of a body whose momentum in the principal frame is constant."""
+    """Quaternion after the time h of a body whose momentum in the principal frame is constant: a turn about L.
+
+    mm is |L|², energy2 is twice the energy of rotation.
+    """
     s = h * (energy2 / mm)
     return qt.renormalise(qt.multiply(qt.exp_map((s * L[0], s * L[1], s * L[2])), q))
 
 
 @inlined
 def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
-    """Attitude after h, in equal parts of at most `PART_ANGLE_LIMIT`."""
+    """Quaternion after a free rotation over h [s], by at most `angle` [rad], in parts of at most `PART_ANGLE_LIMIT`.
+
+    q is the quaternion and m the momentum in the principal frame at the start; mm is |m|², energy2 twice the energy.
+    """
     if angle > PART_ANGLE_LIMIT * PARTS_LIMIT:
         return _turn_steadily(q, L, mm, energy2, h)
     parts = int(angle / PART_ANGLE_LIMIT) + 1
@@ -249,7 +264,12 @@ def _turn_by_parts(q, m, L, J, series, mm, energy2, h, angle):
 
 @kernel
 def _turn_far(q, m, L, J, series, mm, energy2, h):
-    """Attitude after a turn beyond `PART_ANGLE_LIMIT`: by parts, and many turns by periods of the momentum."""
+    """Quaternion after a free rotation over h [s], by an angle that may exceed `PART_ANGLE_LIMIT`.
+
+    The rotation is made in parts; of many turns whole periods of the momentum m are made at once. q is the quaternion
+    and m the momentum in the principal frame at the start; mm is |m|², energy2 twice the energy. The result is NaN if
+    the angle overflows.
+    """
     angle = abs(h) * math.sqrt(max(J[0], J[1], J[2]) * energy2)
     if not angle < math.inf:
         return (math.nan, math.nan, math.nan, math.nan)  # its energy overflows: the caller's guard reports it
@@ -273,7 +293,7 @@ def _turn_far(q, m, L, J, series, mm, energy2, h):
 
 @inlined
 def free_rotation(q, L, J, series, h):
-    """Attitude after a time h of torque-free rotation.
+    """Attitude of a body after a time h of torque-free rotation, as a quaternion of its principal frame.
 
     Parameters
     ----------
@@ -307,6 +327,9 @@ def free_rotation(q, L, J, series, h):
 
 @kernel
 def isotropic_rotation(q, L, J1, h):
-    """Attitude after h when all moments are equal: ω = J1 L is constant, no gyroscopic torque."""
+    """Quaternion after the time h of a body with equal moments, whose angular velocity ω = J1 L is constant.
+
+    J1 is the inverse moment of inertia [1/(kg m²)], L the angular momentum, world frame.
+    """
     s = J1 * h
     return qt.renormalise(qt.multiply(qt.exp_map((s * L[0], s * L[1], s * L[2])), q))

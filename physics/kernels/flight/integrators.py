@@ -1,6 +1,6 @@
 """Textbook integrators of the rigid state Y = (x, q, P, L), one signature for all of them.
 
-    scheme(x, q, v, L, force, torque, g, inv_mass, J, h) -> (x, q, v, L)
+    scheme(y, load, inertia, h) -> y,    y = (x, q, v, L)
 
 The ordinary differential equation is the one of the course notes [1]_:
 
@@ -54,7 +54,7 @@ from typing import NamedTuple
 from physics.compiler.decorators import kernel
 from physics.kernels.math.quaternion import cross, matvec, multiply, normalise, to_matrix, transposed_matvec
 
-# Codes of `step` and `integrate`. 0 is reserved for the exact flow, which stands elsewhere.
+# Codes of the schemes for `step` and `integrate`. 0 is reserved for the exact flow (`free_flight.fly`).
 EXPLICIT_EULER = 1
 SEMI_IMPLICIT_EULER = 2
 MIDPOINT = 3
@@ -62,7 +62,7 @@ RK4 = 4
 
 
 class Load(NamedTuple):
-    """Load of a body, held over a step."""
+    """Force, torque and gravity on a body, constant over a step."""
 
     force: tuple  # 3 scalars [N], world frame
     torque: tuple  # 3 scalars, about the centre of mass [N m], world frame
@@ -70,7 +70,7 @@ class Load(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Mass properties of a body."""
+    """Inverse mass and inverse principal moments of a body."""
 
     inv_mass: float  # 1/M [1/kg]; 0: no force moves it
     J: tuple  # 3 scalars, inverse principal moments [1/(kg m²)]; 0: does not turn
@@ -78,19 +78,19 @@ class Inertia(NamedTuple):
 
 @kernel
 def _along3(a, h, rate):
-    """The tuple a + h rate of 3 scalars."""
+    """Tuple a + h rate of 3 scalars: a after the time h at a constant rate."""
     return (a[0] + h * rate[0], a[1] + h * rate[1], a[2] + h * rate[2])
 
 
 @kernel
 def _along4(a, h, rate):
-    """The tuple a + h rate of 4 scalars."""
+    """Tuple a + h rate of 4 scalars: a after the time h at a constant rate."""
     return (a[0] + h * rate[0], a[1] + h * rate[1], a[2] + h * rate[2], a[3] + h * rate[3])
 
 
 @kernel
 def _along9(a, h, rate):
-    """The tuple a + h rate of 9 scalars."""
+    """Tuple a + h rate of 9 scalars: a after the time h at a constant rate."""
     return (
         a[0] + h * rate[0], a[1] + h * rate[1], a[2] + h * rate[2],
         a[3] + h * rate[3], a[4] + h * rate[4], a[5] + h * rate[5],
@@ -106,21 +106,24 @@ def acceleration(load, inertia):
 
 @kernel
 def angvel_body(q, L, J):
-    """Angular velocity J Rᵀ(q/|q|) L [rad/s], body frame, of a q of any length but zero."""
+    """Angular velocity J Rᵀ(q/|q|) L [rad/s], body frame, for a quaternion q of any length except zero."""
     body = transposed_matvec(to_matrix(normalise(q)), L)
     return (J[0] * body[0], J[1] * body[1], J[2] * body[2])
 
 
 @kernel
 def quaternion_rate(q, L, J):
-    """q' = 1/2 q ω_body [1/s]."""
+    """Rate of the quaternion of a body with angular momentum L, q' = 1/2 q ω_body [1/s]."""
     omega = angvel_body(q, L, J)
     return multiply(q, (0.0, 0.5 * omega[0], 0.5 * omega[1], 0.5 * omega[2]))
 
 
 @kernel
 def matrix_rate(R, L, J):
-    """R' = [ω]x R [1/s], ω = R J Rᵀ L: column by column, ω x (column)."""
+    """Rate of the rotation matrix of a body with angular momentum L, R' = [ω]x R [1/s], with ω = R J Rᵀ L.
+
+    R and the result are nine scalars, row by row. Each column of R' is ω x (column of R).
+    """
     body = transposed_matvec(R, L)
     omega = matvec(R, (J[0] * body[0], J[1] * body[1], J[2] * body[2]))
     a = cross(omega, (R[0], R[3], R[6]))
@@ -131,13 +134,13 @@ def matrix_rate(R, L, J):
 
 @kernel
 def euler_attitude(q, L, J, h):
-    """q + h q'(q, L), not normalised: |q| grows by sqrt(1 + (h|ω|/2)²) a step."""
+    """Attitude by an explicit Euler step, q + h q'(q, L), not normalised: |q| grows by sqrt(1 + (h|ω|/2)²) a step."""
     return _along4(q, h, quaternion_rate(q, L, J))
 
 
 @kernel
 def midpoint_attitude(q, L, torque, J, h):
-    """Attitude by the explicit midpoint rule, not normalised."""
+    """Attitude by a step h of the explicit midpoint rule under a constant torque, as a quaternion, not normalised."""
     half = 0.5 * h
     middle = _along4(q, half, quaternion_rate(q, L, J))
     return _along4(q, h, quaternion_rate(middle, _along3(L, half, torque), J))
@@ -145,7 +148,7 @@ def midpoint_attitude(q, L, torque, J, h):
 
 @kernel
 def rk4_attitude(q, L, torque, J, h):
-    """Attitude by the classical Runge-Kutta method, not normalised."""
+    """Attitude by a step h of the classical Runge-Kutta method at constant torque, as a quaternion, not normalised."""
     half = 0.5 * h
     L_middle = _along3(L, half, torque)
     k1 = quaternion_rate(q, L, J)
@@ -158,16 +161,19 @@ def rk4_attitude(q, L, torque, J, h):
 
 @kernel
 def parabola(x, v, a, h):
-    """x + h (v + h a / 2), the result of any scheme of order 2 or more for a constant acceleration."""
+    """Position x + h (v + h a / 2) after the time h at the constant acceleration a.
+
+    Any scheme of order 2 or more gives this result for a constant acceleration.
+    """
     return _along3(x, h, _along3(v, 0.5 * h, a))
 
 
 @kernel
 def explicit_euler(y, load, inertia, h):
-    """Explicit Euler: every rate from the start of the step. Order 1.
+    """Advance the state y by a step h of explicit Euler: every rate is taken at the start of the step. Order 1.
 
-    Arguments and result: see the module. Under a held acceleration a,
-    x_n = x_0 + n h v_0 + n (n - 1) h² a / 2.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x_n = x_0 + n h v_0 + n (n - 1) h² a / 2.
     """
     x, q, v, L = y
     return (
@@ -180,10 +186,12 @@ def explicit_euler(y, load, inertia, h):
 
 @kernel
 def semi_implicit_euler(y, load, inertia, h):
-    """Semi-implicit (symplectic) Euler: momenta first, x and q with the new ones. Order 1.
+    """Advance the state y by a step h of semi-implicit (symplectic) Euler. Order 1.
 
-    Arguments and result: see the module. Under a held acceleration a,
-    x_n = x_0 + n h v_0 + n (n + 1) h² a / 2.
+    Velocity and angular momentum are advanced first; position and attitude then move with the new ones.
+
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x_n = x_0 + n h v_0 + n (n + 1) h² a / 2.
     """
     x, q, v, L = y
     v_new = _along3(v, h, acceleration(load, inertia))
@@ -193,9 +201,12 @@ def semi_implicit_euler(y, load, inertia, h):
 
 @kernel
 def midpoint(y, load, inertia, h):
-    """Explicit midpoint rule: the rates of an Euler half-step, over the whole step. Order 2.
+    """Advance the state y by a step h of the explicit midpoint rule. Order 2.
 
-    Arguments and result: see the module. Under a held acceleration a, x is exact.
+    The rates of the whole step are those after half an Euler step.
+
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration x is exact.
     """
     x, q, v, L = y
     a = acceleration(load, inertia)
@@ -209,10 +220,10 @@ def midpoint(y, load, inertia, h):
 
 @kernel
 def rk4(y, load, inertia, h):
-    """Classical Runge-Kutta method [2]_ of the module. Order 4.
+    """Advance the state y by a step h of the classical Runge-Kutta method ([2]_ of the module docstring). Order 4.
 
-    Arguments and result: see the module. Under a held acceleration a, x is
-    exact: (v + 4 (v + h a/2) + (v + h a)) h / 6 = h v + h² a / 2.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`.
+    Under a constant acceleration a, x is exact: (v + 4 (v + h a/2) + (v + h a)) h / 6 = h v + h² a / 2.
     """
     x, q, v, L = y
     a = acceleration(load, inertia)
@@ -226,11 +237,11 @@ def rk4(y, load, inertia, h):
 
 @kernel
 def matrix_explicit_euler(y, load, inertia, h):
-    """Explicit Euler on R' = [ω]x R, never re-orthonormalised. Order 1.
+    """Advance (x, R, v, L) by a step of explicit Euler on R' = [ω]x R, never re-orthonormalised. Order 1.
 
     Returns (x, R, v, L), R as nine scalars. About a fixed ω the two columns
-    across it grow by sqrt(1 + (h|ω|)²) a step; a quaternion's length only by
-    sqrt(1 + (h|ω|/2)²), and a division puts that right.
+    across it grow by sqrt(1 + (h|ω|)²) a step; a quaternion's length only grows by
+    sqrt(1 + (h|ω|/2)²), and a division removes that error.
     """
     x, R, v, L = y
     return (
@@ -243,12 +254,12 @@ def matrix_explicit_euler(y, load, inertia, h):
 
 @kernel
 def matrix_rk4(y, load, inertia, h):
-    """Classical Runge-Kutta on R' = [ω]x R, never re-orthonormalised. Order 4.
+    """Advance (x, R, v, L) by a step of classical Runge-Kutta on R' = [ω]x R, never re-orthonormalised. Order 4.
 
     Returns (x, R, v, L), R as nine scalars. About a fixed ω, with y = h|ω|, the
     two columns across it shrink by sqrt(1 - y⁶/72 + y⁸/576) a step (the modulus
-    of the stability polynomial at iy); a quaternion by the same with y/2: 64
-    times less.
+    of the stability polynomial at iy). A quaternion's length shrinks by the same
+    formula with y/2, 64 times less.
     """
     x, R, v, L = y
     half = 0.5 * h
@@ -265,9 +276,10 @@ def matrix_rk4(y, load, inertia, h):
 
 @kernel
 def step(scheme, y, load, inertia, h):
-    """One step of the scheme with code `scheme` (int); see the module for the rest.
+    """Advance the state y by one step of the scheme with the code `scheme` (int).
 
-    An unknown code gives a state of NaN, which cannot be taken for a result; the layer above checks the code.
+    y = (x, q, v, L) and the result have the form of the module docstring; `load` is a `Load`, `inertia` an `Inertia`,
+    and h the step [s]. An unknown code gives a state of NaN; callers check the code before.
     """
     if scheme == EXPLICIT_EULER:
         return explicit_euler(y, load, inertia, h)
@@ -283,7 +295,7 @@ def step(scheme, y, load, inertia, h):
 
 @kernel
 def integrate(scheme, y, load, inertia, h, steps):
-    """State (x, q, v, L) after `steps` (int) equal steps of `step`, the same load held over all of them."""
+    """State (x, q, v, L) after `steps` (int) steps of length h from y by `step`, all with the same load."""
     for _ in range(steps):
         y = step(scheme, y, load, inertia, h)
     return y

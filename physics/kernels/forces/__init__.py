@@ -1,1 +1,1 @@
-"""Force fields: forces and torques that depend on pose, velocities and time of a body. One file per field."""
+"""Force fields: forces and torques that depend on a body's pose, velocities and time. One module per kind of field."""

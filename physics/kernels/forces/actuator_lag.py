@@ -1,4 +1,4 @@
-"""Actuator law of a command: limits, and the exact first-order lag while the command is held."""
+"""Actuators: limit a commanded wrench, and let the actual wrench follow it with a first-order lag."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from physics.compiler.decorators import entry_kernel, inlined
 
 @inlined
 def _shorten(command, i, first, limit):
-    """Shorten three numbers of a row to a length."""
+    """Shorten a vector, three numbers of row i of `command` from column `first`, to the length `limit` at most."""
     x, y, z = command[i, first], command[i, first + 1], command[i, first + 2]
     size = math.sqrt(x * x + y * y + z * z)
     if size > limit:
@@ -19,7 +19,10 @@ def _shorten(command, i, first, limit):
 
 @entry_kernel
 def clamp_command(command, limit_force, limit_torque):
-    """Shorten forces and torques of `command` (rows, 6) to limits [N, N m], inf where there is none."""
+    """Shorten the forces and torques in `command` (rows, 6) [N, N m] to limits, in place.
+
+    The force keeps its direction, and so does the torque. A limit of inf has no effect.
+    """
     for i in range(command.shape[0]):
         _shorten(command, i, 0, limit_force)
         _shorten(command, i, 3, limit_torque)
@@ -27,10 +30,11 @@ def clamp_command(command, limit_force, limit_torque):
 
 @entry_kernel
 def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
-    """Let `output` follow a held `command`, both (rows, 6); add its mean over the time, times `share`, to `applied`.
+    """Let the wrench `output` follow the constant wrench `command` for some time, both (rows, 6) [N, N m].
 
-    The output covers the share `gone` of its distance to the command by the end; the share `kept` of it is missing in
-    the mean.
+    By the end of the time the share `gone` of the difference has vanished. In the mean over the time, the share `kept`
+    of the difference at the start is still there. This mean, times `share`, is added to `applied` (rows, 6), or written
+    to it if `is_first`.
     """
     for i in range(command.shape[0]):
         for c in range(6):

@@ -1,6 +1,7 @@
-"""Buoyancy in a fluid at rest below a plane: F = ρ g V n at the centre of the submerged part.
+"""Buoyancy of a body in a fluid at rest below a plane: F = ρ g V n at the centre of the submerged part.
 
-Its energy is ρ g V times the depth of that centre, since a lifted body leaves its place to the fluid.
+V is the volume of that part, n the upward normal of the plane, ρ the density of the fluid. The potential energy is
+ρ g V times the depth of the centre of the submerged part.
 
 References
 ----------
@@ -19,7 +20,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, times
 from physics.kernels.state.layout import BLOCK, SPHERE
 
-# Columns.
+# Columns of the parameters p.
 FLUID_NORMAL = 0  # of the surface, up
 FLUID_OFFSET = 3  # the fluid is where normal·x <= offset [m]
 FLUID_WEIGHT = 4  # ρ g [N/m³]
@@ -27,7 +28,11 @@ FLUID_WEIGHT = 4  # ρ g [N/m³]
 
 @inlined
 def _wet(state, p):
-    """Volume of the submerged part, its centre relative to the centre of mass, and the height of that centre."""
+    """Submerged part of a body, from its `FieldState` and the parameters p: (volume [m³], centre, height, n).
+
+    The centre of the submerged part is relative to the centre of mass, world frame [m]. The height is that of this
+    centre above the fluid's surface [m], negative below it, and n is the surface's normal.
+    """
     n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
     height = qt.dot(n, plus(state.x, state.center)) - p[FLUID_OFFSET]
     volume, centre = submerged_part(state.shape, state.dims, qt.transposed_matvec(state.R, n), height)
@@ -37,7 +42,7 @@ def _wet(state, p):
 
 @inlined
 def buoyancy(state, p, t):
-    """(force, torque) of the fluid."""
+    """Force and torque about the centre of mass by buoyancy, from a body's `FieldState` and the parameters p."""
     volume, arm, _, n = _wet(state, p)
     force = times(p[FLUID_WEIGHT] * volume, n)
     if state.shape == SPHERE and state.center == ZERO:
@@ -47,14 +52,14 @@ def buoyancy(state, p, t):
 
 @inlined
 def buoyancy_energy(state, p, t):
-    """ρ g V times the depth of the submerged part's centre [J]."""
+    """Potential energy of buoyancy: ρ g V times the depth of the submerged part's centre [J]."""
     volume, _, height, _ = _wet(state, p)
     return -p[FLUID_WEIGHT] * volume * height
 
 
 @inlined
 def _largest_section(state):
-    """Bound of the area of a plane section of the body [m²]: its largest shadow."""
+    """Upper bound of the area of any plane section of a body [m²]: the area of its largest shadow."""
     d = state.dims
     a = (d[1] * d[2], d[2] * d[0], d[0] * d[1])
     size = math.sqrt(qt.dot(a, a))
@@ -63,12 +68,15 @@ def _largest_section(state):
 
 @inlined
 def _squares(state, p, J, h):
-    """Bounds of the squared frequencies of heaving and of rolling [1/s²].
+    """Upper bounds of the squared frequencies with which a floating body heaves, and rolls [1/s²].
 
-    Heaving: ρ g A/m. Rolling about an axis: the second moment of the section about it is at most A (d_j² + d_k²)/3
-    for a block and A (d_j² + d_k²)/4 for an ellipsoid, whose moments of inertia are m (d_j² + d_k²)/3 and m (d_j² +
-    d_k²)/5: at most 5/4 of ρ g A/m. A centre of mass at c from the centre adds ρ g V |c| J, V <= 2 A |d|. None where
-    the surface stays clear of the body in the half step on either side.
+    Both are 0 if the fluid's surface stays clear of the body in half a step h before and after now. Heaving has
+    ρ g A/m, with the area A of the largest section.
+
+    Rolling about an axis: the second moment of the section about it is at most A (d_j² + d_k²)/3 for a block and
+    A (d_j² + d_k²)/4 for an ellipsoid. Their moments of inertia are m (d_j² + d_k²)/3 and m (d_j² + d_k²)/5. So rolling
+    has at most 5/4 of ρ g A/m. A centre of mass at the distance |c| from the geometric centre adds ρ g V |c| J, with
+    V <= 2 A |d|.
     """
     d, c = state.dims, state.center
     height = qt.dot((p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2]), plus(state.x, c)) - p[FLUID_OFFSET]
@@ -82,7 +90,7 @@ def _squares(state, p, J, h):
 
 @inlined
 def buoyancy_rates(state, p, J, h):
-    """Rates of `implicit_loads`."""
+    """Rates (λ, Ω², γ) of buoyancy on one body: damping, squared frequency, turning (`implicit_loads`)."""
     heave, roll = _squares(state, p, J, h)
     if state.shape == SPHERE and state.center == ZERO:
         return (0.0, heave, 0.0)
@@ -91,7 +99,7 @@ def buoyancy_rates(state, p, J, h):
 
 @inlined
 def soften_buoyancy(loads, h, R, state, p, J):
-    """Softened loads of `implicit_loads`, with the bounds of the stiffness."""
+    """Soften the loads (acceleration, torque) of a stage of length h by upper bounds of buoyancy's stiffness."""
     heave, roll = _squares(state, p, J, h)
     n = (p[FLUID_NORMAL], p[FLUID_NORMAL + 1], p[FLUID_NORMAL + 2])
     s = 0.25 * h * h

@@ -32,14 +32,17 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, times
 from physics.kernels.state.layout import BLOCK, SPHERE
 
-# Columns.
+# Columns of the parameters p.
 DRAG_STRENGTH = 0  # ½ ρ C [kg/m³]
 DRAG_LINEAR = 1  # c [N s/m]
 
 
 @inlined
 def swept_volume_rate(shape, dims, R, u):
-    """A(u) |u| [m³/s]: the volume of air that the body's shadow sweeps per second."""
+    """Volume of air that a body's shadow sweeps per second at the relative velocity u, A(u) |u| [m³/s].
+
+    R is the body's rotation matrix; u is in the world frame.
+    """
     if shape == SPHERE:
         return math.pi * dims[0] * dims[0] * math.sqrt(qt.dot(u, u))
     b = qt.transposed_matvec(R, u)
@@ -51,7 +54,7 @@ def swept_volume_rate(shape, dims, R, u):
 
 @inlined
 def drag(state, p, t):
-    """(force, torque) of the drag."""
+    """Force and torque about the centre of mass by drag, from a body's `FieldState` and the parameters p."""
     u = minus(velocity_at(state, state.center), state.air)
     k = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u) + p[DRAG_LINEAR]
     return acting_at(state.center, times(-k, u))
@@ -59,7 +62,10 @@ def drag(state, p, t):
 
 @inlined
 def _slopes(state, p):
-    """Relative velocity u, and slopes of the force along and across u [N s/m]; the quadratic part is doubled along."""
+    """Velocity u of the geometric centre relative to the air, and slopes of the drag force along and across u [N s/m].
+
+    A slope is the change of the force per change of u; for the quadratic part it is twice as large along u.
+    """
     u = minus(velocity_at(state, state.center), state.air)
     quadratic = p[DRAG_STRENGTH] * swept_volume_rate(state.shape, state.dims, state.R, u)
     return u, 2.0 * quadratic + p[DRAG_LINEAR], quadratic + p[DRAG_LINEAR]
@@ -67,7 +73,7 @@ def _slopes(state, p):
 
 @inlined
 def drag_rates(state, p, J, h):
-    """Rates of `implicit_loads`."""
+    """Rates (λ, Ω², γ) of drag on one body: damping, squared frequency, turning (`implicit_loads`)."""
     u, along, across = _slopes(state, p)
     return (
         along * mobility_bound(state.center, state.mass, J),
@@ -78,7 +84,10 @@ def drag_rates(state, p, J, h):
 
 @inlined
 def soften_drag(loads, h, R, state, p, J):
-    """Softened loads of `implicit_loads`; exact for the quadratic law along a line: v' = v/(1 + h k v/m)."""
+    """Soften the loads (acceleration, torque) of a stage of length h by the damping of drag (`implicit_loads`).
+
+    For quadratic drag along a line the result is exact: v' = v/(1 + h k v/m).
+    """
     u, along, across = _slopes(state, p)
     speed = math.sqrt(qt.dot(u, u))
     n = (1.0, 0.0, 0.0)

@@ -1,10 +1,10 @@
-"""Energy budget of a stage with stiff fields: the stage may create none.
+"""Energy budget of a stage with stiff fields: take from the motion the energy that the stage has created.
 
-An implicit step (`implicit_loads`) keeps the energy of a linear spring. Where springs have a rest length, act beside
-the centre of mass, or fluids end at a surface, it may gain. So the energy after such a stage is limited to the energy
-before, plus the work of the held loads, plus the work of fields without an energy: pushes, the wind. The excess is
-taken from the motion. If the motion has less than that, the body went too far up a potential, and is put back to its
-place.
+An implicit step (`implicit_loads`) keeps the energy of a linear spring. It may create energy where springs have a rest
+length or act beside the centre of mass, and where fluids end at a surface. So the energy after such a stage is limited
+to the energy before, plus the work of held loads, plus the work of fields without a potential energy (pushes, wind).
+The excess is taken from the kinetic energy. If that is smaller than the excess, the body went too far up a potential;
+then it is put back to its place at the start of the stage.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import angular_velocity, kinetic_energy
 
-# Share of the energies at hand that rounding may add in a stage.
+# Rounding error of the energy of a stage, as a share of the energies that take part.
 ENERGY_ROUNDING = 1.0e-13
 
-# Share of the kinetic energy by which explicit loads of a stage in contact may miss the work of their fields, and
-# beyond which a stage that gains has not resolved them.
+# Two limits, as shares of the kinetic energy: by which the work of explicit loads, in contact, may miss the change of
+# the fields' potential energy; and of energy created in a stage, beyond which the stage has not resolved its fields.
 WORK_ERROR_SHARE = UNRESOLVED_GAIN_SHARE = 0.01
 
 
 @inlined
 def potential_energy(y, later, offset_frame, body):
-    """Potential energy of all fields at y, `later` [s] than now [J]."""
+    """Potential energy [J] of all fields for a body in the state y, at the time `body.now` + `later` [s]."""
     x, q, v, L = y
     t = body.now + later
     return total_energy(field_state(x, q, v, L, t, offset_frame, body), t, body)
@@ -41,20 +41,24 @@ def potential_energy(y, later, offset_frame, body):
 
 @inlined
 def _middle(y, end):
-    """Mean velocities of a stage, at its start's place."""
+    """State with the pose of y and the means of the velocities and angular momenta of y and `end`."""
     return y[0], y[1], times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
 
 
 @inlined
 def constant_loads(body):
-    """Acceleration and torque held over the step."""
+    """Acceleration [m/s²] and torque [N m] by gravity and wrench, which are constant over the step."""
     a, T = body.held_acceleration, body.held_torque
     return (a[0], a[1], a[2]), (T[0], T[1], T[2])
 
 
 @kernel
 def energy_gain(y, end, h, offset_frame, body):
-    """(energy created by a stage from y to `end`, its kinetic energy, rounding of both) [J]."""
+    """Energy that a stage of length h from y to `end` has created, kinetic energy at `end`, and their rounding [J].
+
+    Created is the change of kinetic and potential energy, less the work of held loads and the work that fields without
+    a potential energy supply.
+    """
     x, q, v, L = _middle(y, end)
     before, after = (
         kinetic_energy(y[1], y[2], y[3], body, offset_frame),
@@ -71,7 +75,10 @@ def energy_gain(y, end, h, offset_frame, body):
 
 @if_declared(False)
 def has_work_error(y, end, h, offset_frame, body):
-    """True if the work of explicit loads from y to `end` misses the change of the fields' energy."""
+    """True if loads in the middle of a stage from y to `end` do not do the work that the fields' energy loses.
+
+    h is the length of the stage; the difference must be more than WORK_ERROR_SHARE of the kinetic energy.
+    """
     x, q, v, L = _middle(y, end)
     t = body.now + 0.5 * h
     state = field_state(plus(x, times(0.5 * h, y[2])), q, v, L, t, offset_frame, body)
@@ -90,10 +97,10 @@ def _as_it_is(y, end, h, is_free, offset_frame, body):
 
 @if_declared(_as_it_is)
 def limit_energy_gain(y, end, h, is_free, offset_frame, body):
-    """State `end` of a stage of length h from y, without the energy that the stage created.
+    """State after a stiff stage of length h from y to `end`, with the energy that the stage created taken away.
 
-    If the motion is too small for the excess, the body is back at y: reversed in free flight (`is_free`), without
-    velocity in contact.
+    The excess is taken from the velocities. If the kinetic energy is smaller than the excess, the body is put back to
+    its pose in y: in free flight (`is_free`) with reversed velocities, in contact without velocity.
     """
     if body.is_stiff == 0:
         return end

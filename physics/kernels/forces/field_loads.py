@@ -1,4 +1,9 @@
-"""Loads of all fields at a state, added to the loads that are held over the step."""
+"""Evaluate the loads of all fields at a state of a body, and let them act together with the held loads.
+
+*Held* loads are those of gravity and wrench, which are constant over a step. The loads that act on the body are its
+`free_acceleration` and `torque`. Two forms of a load occur: (F, T), force [N] and torque [N m], and (a, T), with the
+acceleration a [m/s²] instead of the force.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +22,7 @@ from physics.kernels.state.body import angular_velocity, principal_attitude
 
 @inlined
 def field_state(x, q, v, L, t, offset_frame, body):
-    """State of a body as its fields read it."""
+    """Make the `FieldState` of a body with the state (x, q, v, L) at the time t [s]."""
     R = qt.to_matrix(q)
     w = angular_velocity(q, L, body, offset_frame)
     center = ZERO
@@ -30,7 +35,11 @@ def field_state(x, q, v, L, t, offset_frame, body):
 
 @inlined
 def kicked_state(x, q, v, L, loads, kick, later, offset_frame, body):
-    """State for the fields, `later` [s] than now, after loads (F, T) and the held ones have acted for `kick` [s]."""
+    """Make the `FieldState` of a body whose velocities were changed by loads for the time `kick` [s].
+
+    The pose is that of x and q. The fields' loads (F, T) and the held loads act on v and L. The fields are evaluated at
+    the time `body.now` + `later` [s].
+    """
     a, torque = add_held_loads(loads[0], loads[1], body)
     return field_state(
         x, q, plus(v, times(kick, a)), plus(L, times(kick, torque)), body.now + later, offset_frame, body
@@ -39,13 +48,17 @@ def kicked_state(x, q, v, L, loads, kick, later, offset_frame, body):
 
 @inlined
 def field_load(x, q, v, L, t, offset_frame, body):
-    """(force, torque about the centre of mass) of all fields at a state and a time."""
+    """Force [N] and torque about the centre of mass [N m] of all fields together, at a state and a time t [s]."""
     return total_load(field_state(x, q, v, L, t, offset_frame, body), t, body)
 
 
 @inlined
 def apply_loads(force, torque, body):
-    """Let loads act beside the held ones; `body.acceleration` bounds the acceleration of any point of the body."""
+    """Let a force [N] and a torque [N m] of fields act on a body, together with the held loads.
+
+    Written are `body.free_acceleration`, `body.torque`, and `body.acceleration`, a bound of the acceleration of any
+    point of the body.
+    """
     inv_mass, J = 1.0 / body.mass, body.J
     for c in range(3):
         body.free_acceleration[c] = body.held_acceleration[c] + inv_mass * force[c]
@@ -58,19 +71,19 @@ def apply_loads(force, torque, body):
 
 @inlined
 def principal_axes_matrix(q, offset_frame, body):
-    """Principal axes in the world."""
+    """Rotation matrix from the principal axes of a body to the world, from its quaternion q."""
     return qt.to_matrix(principal_attitude(q, body, offset_frame))
 
 
 @inlined
 def add_held_loads(F, T, body):
-    """Acceleration [m/s²] and torque [N m] of fields' loads plus the held ones."""
+    """Acceleration [m/s²] and torque [N m] of a force F and a torque T of fields, with the held loads added."""
     return plus(as_vector(body.held_acceleration), times(1.0 / body.mass, F)), plus(as_vector(body.held_torque), T)
 
 
 @inlined
 def apply_total_loads(loads, body):
-    """Let total loads act."""
+    """Let the loads (a, T), which include the held loads, act on a body."""
     a, T = loads
     F = times(body.mass, minus(a, as_vector(body.held_acceleration)))
     apply_loads(F, minus(T, as_vector(body.held_torque)), body)
@@ -78,25 +91,25 @@ def apply_total_loads(loads, body):
 
 @inlined
 def subtract_loads(b, a):
-    """Difference of two pairs of acceleration and torque."""
+    """Difference b - a of two loads, each a pair (acceleration, torque)."""
     return minus(b[0], a[0]), minus(b[1], a[1])
 
 
 @inlined
 def add_loads(a, b):
-    """Sum of two pairs of acceleration and torque."""
+    """Sum of two loads, each a pair (acceleration, torque)."""
     return plus(a[0], b[0]), plus(a[1], b[1])
 
 
 @inlined
 def acting_loads(body):
-    """Acceleration and torque that act."""
+    """Acceleration [m/s²] and torque [N m] that act on a body now, held loads included."""
     return as_vector(body.free_acceleration), as_vector(body.torque)
 
 
 @inlined
 def load_bound(loads, body):
-    """Bound of the acceleration of any point of the body under an acceleration and a torque [m/s²]."""
+    """Upper bound of the acceleration of any point of a body under the loads (a, T) [m/s²]."""
     a, T = loads
     J = max(body.J[0], body.J[1], body.J[2])
     return math.sqrt(qt.dot(a, a)) + body.radius * J * math.sqrt(qt.dot(T, T))

@@ -1,11 +1,10 @@
-"""Dispatch to the fields that a kernel is compiled for, by the *type* of a body's record.
+"""Choose the kernels of a scene's force fields by the *type* of a body's record.
 
-A scene's fields are members of the record of each body: one marker per kind of field, `load_drag_1x3` for one `Drag` of
-three columns. Numba compiles a kernel per type of its arguments, so that a record without markers has kernels without
-fields, and one with them is found in the disk cache by its markers, from any process. A user's own field is marked
-with a digest of its source: an edit is another type.
-
-Its kernel is chosen by the type of the record (`physics.compiler.decorators.by_type`), and nothing is passed for it.
+The record of each body has a member for each kind of field in the scene, a *marker*: `load_drag_1x3` stands for one
+`Drag` with three columns of parameters. A marker's name tells the compiler which field it is; its value is not used.
+Numba compiles a kernel for each type of its arguments. So a record without markers gets kernels without fields, and a
+record with markers finds its kernels in the disk cache, from any process. The marker of a user's own field has a digest
+of its source, so an edited field has another type. Kernels are chosen by `physics.compiler.decorators.by_type`.
 """
 
 from __future__ import annotations
@@ -18,35 +17,35 @@ from physics.kernels.forces.force_field_state import ZERO
 from physics.kernels.math.quaternion import dot
 from physics.kernels.math.vector import plus
 
-# First word of a marker: what the field's function gives, a (force, torque) or the velocity of the air.
+# First word of a marker: the field's function returns (force, torque), or the velocity of the air.
 LOAD, AIR = "load", "air"
 
 
 class Term(NamedTuple):
-    """A kind of field in a scene.
+    """One kind of force field in a scene, with its kernels; `state` is a `FieldState` in all of them.
 
     Attributes
     ----------
     marker : str
-        Member of a body's record.
+        Name of the member of a body's record that declares the field.
     function : dispatcher
-        (state, parameters, time) -> (force, torque), or -> velocity of the air.
+        Load of the field: (state, parameters, time) -> (force, torque); of wind the velocity of the air.
     energy : dispatcher or None
-        (state, parameters, time) -> potential energy [J].
+        Potential energy [J]: (state, parameters, time) -> float. None for a field without one.
     size : int
-        Columns of one field.
+        Number of parameters (columns) of one field.
     count : int
-        Fields of this kind.
+        Number of fields of this kind in the scene.
     is_linked : bool
-        Whether its loads depend on other bodies, too.
+        True if the loads also depend on other bodies.
     rates : dispatcher or None
-        (state, parameters, inverse moments, step) -> the three rates of `implicit_loads`; None of a user's field.
+        Rates (λ, Ω², γ) of `implicit_loads`: (state, parameters, inverse moments, step). None for a user's field.
     mean : dispatcher or None
-        (states in the middle, at the start and at the end, parameters, time) -> the load of a discrete gradient; None:
-        that of the middle.
+        Load over a whole stage, a discrete gradient: ((states in the middle, at start, at end), parameters, time) ->
+        (force, torque). None: the load in the middle.
     soften : dispatcher or None
-        (acceleration and torque, step, principal axes, state, parameters, inverse moments) -> the same, as the
-        implicit step would have them; None of a field whose loads depend neither on place nor on velocity.
+        Softened loads of `implicit_loads`: ((acceleration, torque), step, principal axes, state, parameters, inverse
+        moments) -> (acceleration, torque). None for a field whose loads depend neither on place nor on velocity.
     """
 
     marker: str
@@ -64,12 +63,12 @@ _KNOWN: dict[str, Term] = {}
 
 
 def register_terms(terms: tuple[Term, ...]) -> None:
-    """Register terms before a kernel is compiled for a record that holds their markers."""
+    """Register a scene's terms under their markers, before a kernel is compiled for a record with these markers."""
     _KNOWN.update((term.marker, term) for term in terms)
 
 
 def term_members(terms: tuple[Term, ...]) -> list[tuple]:
-    """Members of a body's record for these terms; none without terms."""
+    """Fields, in the form of `numpy.dtype`, that a body's record has for these terms; none without terms."""
     if not terms:
         return []
     columns = sum(term.count * term.size for term in terms)
@@ -99,15 +98,16 @@ def _markers(names) -> list[str]:
 
 
 def if_declared(otherwise=None):
-    """Make a kernel of a function whose last argument is a body; without fields it only returns `otherwise`.
+    """Decorate a kernel, whose last argument is a body's record, that is called only in scenes with force fields.
 
-    A function for `otherwise` is called instead. That is inlined: nothing is left of it.
+    In other scenes `otherwise` takes its place: a function is called with the same arguments and inlined, any other
+    value is returned.
     """
     return when(lambda *types: bool(_markers(members(types[-1]))), otherwise)
 
 
 def if_user_field(otherwise=None):
-    """Make a kernel like `if_declared`, for scenes with a user's field, which does not tell its rates."""
+    """Decorate a kernel like `if_declared`, for scenes with a user's own field, which has no `rates`."""
     return when(lambda *types: _has_unknown(members(types[-1])), otherwise)
 
 
@@ -116,7 +116,10 @@ def _has_unknown(names: list[str]) -> bool:
 
 
 def iterate_terms(body, kind: str) -> Iterator[tuple[Term, int, int]]:
-    """Each field of this kind in a body's record: its term, first and last column."""
+    """Yield (term, first, last) for each field of a kind, LOAD or AIR, in a body's record or in the type of one.
+
+    The field's parameters are `body.columns[first:last]`.
+    """
     first = 0
     for marker in _markers(members(body)):
         term = _KNOWN[marker]
@@ -127,7 +130,19 @@ def iterate_terms(body, kind: str) -> Iterator[tuple[Term, int, int]]:
 
 
 def _sum(kind: str, start: Callable, chosen: Callable, add: Callable):
-    """Make a kernel (state, t, body) that adds up chosen functions of a body's fields."""
+    """Make a kernel (state, t, body) that adds up a function of each of a body's fields.
+
+    Parameters
+    ----------
+    kind : str
+        LOAD or AIR.
+    start : function (state, t, body)
+        The sum's first value, zero.
+    chosen : function (term)
+        Returns the function of a term, or None for a term that is left out.
+    add : function (before, function, first, last)
+        Makes the function that adds a field, with its columns first to last, to the sum `before`.
+    """
 
     def total(state, t, body):
         result = start
@@ -148,7 +163,7 @@ def _no_air(state, t, body):
 
 
 def _of_middle(function):
-    """Adapter of a field's function to the middle one of a stage's three states."""
+    """Make a function like `Term.mean` of a field's `function`, which it calls with the state in the stage's middle."""
 
     def load(states, p, t):
         return function(states[0], p, t)
@@ -216,7 +231,10 @@ total_user_load = _sum(LOAD, _no_load, lambda term: term.function if term.rates 
 
 
 def _mean_load(states, t, body):
-    """Mean load of all fields over a stage, by discrete gradients, from `states` at its middle, start and end."""
+    """Force and torque of all fields over a stage, by discrete gradients, from states at its middle, start and end.
+
+    The arguments of the resulting kernel are these three states, a time t [s] and a body's record.
+    """
     result = _no_load
     for term, first, last in iterate_terms(body, LOAD):
         mean = runtime_kernel(_of_middle(term.function)) if term.mean is None else term.mean
@@ -239,7 +257,10 @@ def _then_soften(before, function, first, last):
 
 
 def _softened(loads, h, R, state, body):
-    """Acceleration and torque softened by the implicit step over h, one field after the other."""
+    """Soften the loads (acceleration, torque) of a stage of length h by all fields of a body, one after the other.
+
+    R is the matrix of the principal axes, `state` a `FieldState` (`implicit_loads`).
+    """
     result = _as_it_is
     for term, first, last in iterate_terms(body, LOAD):
         if term.soften is not None:

@@ -1,4 +1,4 @@
-"""State of a body for force fields, and their vector algebra."""
+"""State of a body in the form that force fields read, with the velocity and the load at a point of it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class FieldState(NamedTuple):
-    """A body at a moment; all vectors are in the world frame unless stated otherwise.
+    """State of a body as force fields read it; vectors are in the world frame unless stated otherwise.
 
     Attributes
     ----------
@@ -25,7 +25,7 @@ class FieldState(NamedTuple):
     air : tuple of 3 floats
         Velocity of the air [m/s]: of `physics.Wind`, or zero.
     mass : float
-        [kg].
+        Mass of the body [kg].
     shape : int
         `layout.BLOCK`, `SPHERE` or `ELLIPSOID`.
     dims : tuple of 3 floats
@@ -45,11 +45,11 @@ class FieldState(NamedTuple):
 
 @inlined
 def velocity_at(s, arm):
-    """Velocity of the body at a point `arm` away from its centre of mass [m/s]."""
+    """Velocity of the point of a body at `arm` [m] from its centre of mass, world frame [m/s]; s is a `FieldState`."""
     return plus(s.v, qt.cross(s.w, arm))
 
 
 @inlined
 def acting_at(arm, force):
-    """(force, torque about the centre of mass) of a force at a point `arm` away from it."""
+    """Force and torque about the centre of mass of a force that acts at `arm` [m] from the centre of mass."""
     return force, qt.cross(arm, force)

@@ -1,17 +1,18 @@
-"""Acceleration and torque of a step with fields: loads that are held, and when fields are evaluated.
+"""Set the acceleration and torque that act on a body in a stage, in scenes with force fields.
 
-Without fields `body.free_acceleration` and `body.torque` are what gravity and the wrench make them, for the whole
-call. With fields they are set anew:
+Without fields `body.free_acceleration` and `body.torque` come from gravity and wrench, and stay the same for the whole
+call. With fields they are set anew for each stage:
 
-- time stepping holds over a stage of length h the loads of its *middle* (`hold_loads`): place and attitude there are
-  those of a free drift over h/2, velocities have half a kick of all loads. That is the Strang splitting of drift and
-  kick, the kick by the midpoint rule: second order, leapfrog for a field of the position alone, exact where the field
-  is zero, and what is in equilibrium stays there;
-- in contact the velocity at the middle is that of the start, then, where the loads depend on it, the mean of start and
-  end of a first trial (`hold_mean_loads`);
-- the event-driven scheme asks for them at every state it looks at (`refresh_loads`).
+- Time stepping holds the loads of the middle of a stage of length h, constant over the stage (`hold_loads`). The pose
+  in the middle is that of a free drift over h/2, and the velocities have half a kick of all loads. This is the Strang
+  splitting of drift and kick, with the midpoint rule for the kick. It is of second order, leapfrog for a field that
+  depends on the position alone, and exact where the field is zero. An equilibrium stays one.
+- In contact the velocity in the middle is taken as that of the start (`hold_contact_loads`). Where the loads depend on
+  the velocity, the stage is made again with the mean of start and end (`hold_mean_loads`).
+- The event-driven scheme sets the loads at each state that it evaluates (`refresh_loads`).
 
-None of this is in a kernel whose scene declares no field (`force_field_dispatch.if_declared`).
+The arguments gyroscopic and offset_frame are those of `FlightSwitches`. All of this is left out of kernels whose scene
+declares no field (`force_field_dispatch.if_declared`).
 """
 
 from __future__ import annotations
@@ -38,17 +39,19 @@ from physics.kernels.forces.resolution_limits import check_stage_resolution, not
 from physics.kernels.math.vector import as_vector, plus, times
 from physics.kernels.state import layout as at
 
-# Evaluations of the midpoint rule beyond the first, and half a turn of the velocity [rad] up to which one will do: it
-# gains z⁴/2 of the energy of what turns by 2 z. Fixed point rounds gain z^(2k + 2) after k: rounding, up to z = 1/4.
+# Largest number of iterations of the midpoint rule, and half of the angle by which loads turn the velocity in a stage
+# [rad], up to which one iteration suffices. Let the angle be 2 z. One iteration changes the energy by its share z⁴/2,
+# k fixed-point iterations by z^(2k + 2): that is rounding, up to z = 1/4.
 MIDPOINT_ROUNDS = 13
 EXPLICIT_TURN = 1.0e-4
 
 
 @if_declared()
 def bind_fields(params, i, scheme, body):
-    """Store the fields' parameters of body i, and the step's held loads, in `body`.
+    """Copy the fields' parameters of body i from `params`, and the loads of gravity and wrench, into its record `body`.
 
-    A textbook scheme (`scheme` not None) keeps its explicit loads at any step: it is there to show what they do.
+    A textbook scheme (`scheme` is its code, else None) uses explicit loads at any step, since it is there for
+    comparison.
     """
     for c in range(body.columns.shape[0]):
         body.columns[c] = params[i, at.PARAM_SIZE + c]
@@ -61,19 +64,22 @@ def bind_fields(params, i, scheme, body):
 
 @if_declared()
 def set_clock(elapsed, body):
-    """Set the time since the start of the call [s]."""
+    """Set the present time of a body to `elapsed` [s] after the start of the call."""
     body.now = body.call_start + elapsed
 
 
 @if_declared()
 def advance_clock(h, body):
-    """Advance the time since the start of the call by [s]."""
+    """Advance the present time of a body by h [s]."""
     body.now += h
 
 
 @if_declared()
 def hold_loads(y, h, gyroscopic, offset_frame, body):
-    """Hold the loads of the middle of a flight of length h that starts at y, now."""
+    """Let the loads of the middle of a flight act on a body over the whole flight, of length h [s] from the state y.
+
+    Rates of the fields are noted, too. If the stage is stiff, the loads are softened (`implicit_loads`).
+    """
     x, q, v, L = y
     half = 0.5 * h
     t = body.now + half
@@ -98,9 +104,10 @@ def hold_loads(y, h, gyroscopic, offset_frame, body):
 
 @if_declared()
 def hold_contact_loads(y, h, gyroscopic, offset_frame, body):
-    """Hold the loads of the middle of a stage in contact, with the velocities of its start.
+    """Let the loads of the middle of a stage in contact act over the whole stage, of length h [s] from the state y.
 
-    Where the stage is stiff, those that depend on velocities are softened as if there were no contact.
+    They are evaluated with the velocities of the start. If the stage is stiff, the part of the loads that depends on
+    velocities is softened (`implicit_loads`), as if there were no contact.
     """
     x, q, v, L = y
     half = 0.5 * h
@@ -127,10 +134,11 @@ def hold_contact_loads(y, h, gyroscopic, offset_frame, body):
 
 @if_declared(False)
 def hold_mean_loads(y, end, h, gyroscopic, offset_frame, body):
-    """Hold the loads of the middle of a stage in contact from y to `end`; return whether they have changed.
+    """Let loads at the mean velocities of a stage in contact act, after a trial of it; return whether they changed.
 
-    Contacts may have changed the motion, so stiffness is tested again. In a stiff stage the change is softened: with A'
-    = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A) loads and motion agree, if the contacts push as before.
+    The trial took the state from y to `end` in h [s]. Contacts may have changed the motion, so stiffness is tested
+    again. In a stiff stage only the softened change of the loads is added: with A' = A + (1 + M⁻¹ Z)⁻¹ (A(middle) - A)
+    loads and motion agree, if the contacts push as before.
     """
     x, q, v, L = y
     half = 0.5 * h
@@ -160,7 +168,7 @@ def hold_mean_loads(y, end, h, gyroscopic, offset_frame, body):
 
 @if_declared()
 def hold_softened_loads(y, h, gyroscopic, offset_frame, body):
-    """Hold the loads of an implicit step over h from y, with or without contact."""
+    """Let the softened loads of the middle of a stage act, of length h [s] from the state y, in contact or flight."""
     x, q, v, L = y
     half = 0.5 * h
     t = body.now + half
@@ -174,7 +182,7 @@ def hold_softened_loads(y, h, gyroscopic, offset_frame, body):
 
 @if_declared()
 def refresh_loads(y, later, offset_frame, body):
-    """Let the loads at the state y act, `later` [s] than now."""
+    """Let the loads at the state y and the time `body.now` + `later` [s] act; note whether any of them is nonzero."""
     x, q, v, L = y
     F, T = field_load(x, q, v, L, body.now + later, offset_frame, body)
     apply_loads(F, T, body)
@@ -184,30 +192,30 @@ def refresh_loads(y, later, offset_frame, body):
 
 @if_declared(False)
 def has_fields(body):
-    """True if the scene declares a field."""
+    """True if the scene declares a force field."""
     return True
 
 
 @if_declared(0.0)
 def time_now(body):
-    """Present time [s]."""
+    """Present time of a body [s]; 0 in scenes without fields."""
     return body.now
 
 
 @if_declared(0.0)
 def reset_felt_flag(body):
-    """Clear the flag of `has_felt_field`; return the present time [s]."""
+    """Clear the flag that `has_felt_field` reads; return the present time of the body [s]."""
     body.is_felt = 0
     return body.now
 
 
 @if_declared()
 def set_now(t, body):
-    """Set the present time [s]."""
+    """Set the present time of a body to t [s]."""
     body.now = t
 
 
 @if_declared(True)
 def has_felt_field(body):
-    """True if a field, or a held torque, was nonzero anywhere since `reset_felt_flag`."""
+    """True if a field or a held torque was nonzero in any `refresh_loads` of the body since `reset_felt_flag`."""
     return body.is_felt == 1

@@ -1,6 +1,7 @@
-"""Implicit loads of both ends at once of springs between bodies that a step does not resolve (`implicit_loads`).
+"""Soften the loads of stiff springs between two bodies, for both bodies at once (`implicit_loads`).
 
-Also where the columns of such a spring stand, and the state of a body in the middle of a stage.
+The module also names the columns of such a spring, and reads and writes the *middle* of a body: its state (x, q, v, L)
+in the middle of a stage, at which all loads are evaluated.
 """
 
 from __future__ import annotations
@@ -23,25 +24,26 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import apply_inv_inertia, principal_attitude
 
-# Columns: those of a spring, whose anchor is the other body's point now, and after them
+# Columns of a spring between two bodies, in the parameters of each of them. Columns 0 to 8 are those of a spring to a
+# fixed anchor (`spring`); the anchor is the other body's point now. These follow:
 LINK_ANCHOR = 3
-LINK_VELOCITY = 9  # of the anchor, world frame [m/s]
-LINK_OTHER = 12  # index of the other body, -1: the spring is not at this one
-LINK_OTHER_POINT = 13  # in the other body's frame, from its centre of mass [m]
-LINK_OTHER_MOBILITY = 16  # bound of the inverse mass of that point [1/kg]
+LINK_VELOCITY = 9  # velocity of the anchor, world frame [m/s]
+LINK_OTHER = 12  # index of the other body; -1: the spring is not attached to this body
+LINK_OTHER_POINT = 13  # anchor in the other body's frame, from its centre of mass [m]
+LINK_OTHER_MOBILITY = 16  # bound of the inverse mass of the anchor [1/kg], by `mobility_bound`
 LINK_SIZE = 17
 
 
 @inlined
 def read_middle(body):
-    """(x, q, v, L) of a body in the middle of the stage."""
+    """Read the state (x, q, v, L) that a body has in the middle of the stage, `body.middle`."""
     m = body.middle
     return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
 
 
 @inlined
 def write_middle(body, y):
-    """Write (x, q, v, L) of a body in the middle of the stage."""
+    """Store y = (x, q, v, L) as the state of a body in the middle of the stage, `body.middle`."""
     x, q, v, L = y
     m = body.middle
     m[0], m[1], m[2] = x
@@ -52,20 +54,23 @@ def write_middle(body, y):
 
 @inlined
 def middle_field_state(body, later, offset_frame):
-    """State for the fields of a body in its middle."""
+    """Make the `FieldState` of a body in the middle of the stage, at the time `body.now` + `later` [s]."""
     x, q, v, L = read_middle(body)
     return field_state(x, q, v, L, body.now + later, offset_frame, body)
 
 
 @inlined
 def _principal(body, offset_frame):
-    """Principal axes of a body in its middle."""
+    """Rotation matrix of the principal axes of a body in the middle of the stage."""
     return qt.to_matrix(principal_attitude(read_middle(body)[1], body, offset_frame))
 
 
 @inlined
 def _own_loads(body, h, offset_frame):
-    """Loads of a body by the implicit step over h of its own fields, without springs to other bodies."""
+    """Softened loads (acceleration, torque) of a body in a stage of length h, without springs to other bodies.
+
+    They are the held loads and those of its own fields, softened by its own fields.
+    """
     state = middle_field_state(body, 0.5 * h, offset_frame)
     F, T = total_own_load(state, body.now + 0.5 * h, body)
     return soften_loads(add_held_loads(F, T, body), h, _principal(body, offset_frame), state, body)
@@ -73,7 +78,7 @@ def _own_loads(body, h, offset_frame):
 
 @inlined
 def _hold_unsoftened_springs(body, h, offset_frame):
-    """Add the loads of springs to other bodies to the body's own softened loads."""
+    """Let a body's own softened loads act, together with unsoftened loads of its springs to other bodies."""
     F, T = total_linked_load(middle_field_state(body, 0.5 * h, offset_frame), body.now + 0.5 * h, body)
     a, torque = _own_loads(body, h, offset_frame)
     apply_total_loads((plus(a, times(1.0 / body.mass, F)), plus(torque, T)), body)
@@ -81,7 +86,10 @@ def _hold_unsoftened_springs(body, h, offset_frame):
 
 @inlined
 def _soften_springs(body, h, offset_frame):
-    """Soften, by the body's own fields, the loads that already softened springs add to its own loads."""
+    """Soften, by a body's own fields, the part of its acting loads that comes from springs to other bodies.
+
+    `_soften_pair` must have softened this part by the springs before.
+    """
     own = _own_loads(body, h, offset_frame)
     added, state = subtract_loads(acting_loads(body), own), middle_field_state(body, 0.5 * h, offset_frame)
     apply_total_loads(add_loads(own, soften_loads(added, h, _principal(body, offset_frame), state, body)), body)
@@ -89,7 +97,10 @@ def _soften_springs(body, h, offset_frame):
 
 @kernel
 def _soften_pair(k, one, other, h, offset_frame):
-    """Soften the loads of two bodies by the spring in columns k over h: equal and opposite changes."""
+    """Soften the acting loads of the bodies `one` and `other` by the spring between them, for a stage of length h.
+
+    The spring's columns begin at k in `one.columns`. Both bodies get opposite changes of force at the spring's points.
+    """
     columns = one.columns
     state, p = middle_field_state(one, 0.5 * h, offset_frame), columns[k : k + LINK_SIZE]
     arm, e, l = spring_vector(state, p)
@@ -116,10 +127,11 @@ def _soften_pair(k, one, other, h, offset_frame):
 
 @inlined
 def hold_implicit_loads(first, count, h, offset_frame, bodies):
-    """Let loads act by the implicit step over h: own fields, then springs between bodies, one after another.
+    """Let softened loads act on all bodies of a world, in a stiff stage of length h with springs between bodies.
 
-    A field softens the loads of a spring after the spring itself has. A damper leaves little of its load, so even a
-    small share taken from one of the two bodies before that would be large.
+    `count` springs have their columns from `first` on. Own fields soften the own loads first. Then each spring softens
+    the loads at both of its ends, one spring after the other. Own fields soften the loads of springs last: a damper
+    leaves little of its own load, so even a small share taken from one body before that would be relatively large.
     """
     for b in range(bodies.shape[0]):
         _hold_unsoftened_springs(bodies[b], h, offset_frame)
@@ -134,7 +146,10 @@ def hold_implicit_loads(first, count, h, offset_frame, bodies):
 
 @kernel
 def note_world_rates(h, offset_frame, bodies):
-    """Note for all bodies whether a stage of length h is too long for the explicit midpoint rule for any of them."""
+    """Test whether a stage of length h is stiff for any body of a world; return it, and note it in all bodies.
+
+    Stiff means too long for the explicit midpoint rule.
+    """
     stiff = 0
     for b in range(bodies.shape[0]):
         body, state = bodies[b], middle_field_state(bodies[b], 0.5 * h, offset_frame)

@@ -1,4 +1,4 @@
-"""Loads and energies of the fields now, for diagnostics of a world."""
+"""Evaluate the loads and potential energies of all force fields at given states, for diagnostics of a world."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ from physics.kernels.state.groups import BodyArrays
 
 @entry_kernel
 def evaluate_fields(state, params, shapes, offset_frame, start, scratch, wrenches, energies):
-    """Write force and torque of all fields (rows, 6) [N, N m] and potential energies (rows,) [J] at `start` [s].
+    """Write the total load and potential energy of the fields of each body, at the time `start` [s].
 
-    `wrenches` is zero at first: it is the wrench that is bound, too.
+    Written are `wrenches` (rows, 6), force and torque about the centre of mass [N, N m], and `energies` (rows,) [J].
+    `wrenches` must be zero before the call, since it is also read as the wrench that users apply. `scratch` has one
+    record of a body.
     """
     body, bodies = scratch[0], BodyArrays(state, params, shapes, None, wrenches)
     for i in range(state.shape[0]):

@@ -1,4 +1,9 @@
-"""Resolution of the fields by a stage: built-in fields tell their rates, others show it by changes of loads."""
+"""Test whether a stage is short enough for its force fields.
+
+Built-in fields tell their rates. Users' fields do not; they are tested by the changes of their loads over the stage.
+The results are flags in the record of a body: `is_stiff`, the loads must be softened (`implicit_loads`), and
+`is_coarse`, the stage does not resolve a field, which the report tells.
+"""
 
 from __future__ import annotations
 
@@ -28,23 +33,25 @@ from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity
 
-# A user's field is not resolved where its loads change by more than this until the middle of a step, times speed/step.
+# A user's field is not resolved where its loads change by more than this from the start of a stage to its middle, in
+# units of speed over length of the stage.
 _COARSE_CHANGE = 2.0
 
-# Share of a kick's cause by which the loads of a user's field may change in half of it without opposing it: a radian a
-# step.
+# Half a kick may change the loads of a user's field by this share of the loads that kick, unless the change opposes
+# them. At this share they turn by a radian in a stage.
 _TURNING_SHARE = 0.5
 
-# Share of all loads up to which a change of them is rounding.
+# A change of the loads by less than this share of all loads is rounding.
 _LOAD_ROUNDING = 1.0e-9
 
 
 @kernel
 def note_field_rates(state, late, h, body):
-    """Note whether a stage of length h is too long for the explicit midpoint rule, and for resolving the fields.
+    """Set the flags `is_stiff` and `is_coarse` of a body for a stage of length h, from the rates of its fields.
 
-    `state` and `late` are at the same place, with the velocities of the stage's start and those that its loads lead to:
-    between them damping may grow, and a body reach a surface.
+    The larger rates at two `FieldState`s count: `state` has the velocities of the stage's start, `late` those that its
+    loads lead to, since damping may grow in between and the body may reach a surface. Also written are `body.rate` and
+    `body.damping`. Returns the rate γ at which fields turn the velocity [1/s].
     """
     first, last = total_rates(state, h, body), total_rates(late, h, body)
     rates = max(first[0], last[0]), max(first[1], last[1]), max(first[2], last[2])
@@ -57,7 +64,10 @@ def note_field_rates(state, late, h, body):
 
 @inlined
 def _change_of(first, second, body):
-    """Change between two loads (F, T): acceleration, torque, and a bound of any point's acceleration by it [m/s²]."""
+    """Change from the load `first` (F, T) to `second`: the pair (acceleration, torque), and a bound of its size.
+
+    The bound is that of the acceleration of any point of the body by the change [m/s²].
+    """
     F, T = minus(second[0], first[0]), minus(second[1], first[1])
     change = times(1.0 / body.mass, F), T
     return change, load_bound(change, body)
@@ -65,7 +75,11 @@ def _change_of(first, second, body):
 
 @inlined
 def _change_by_kick(kick, moved, v, L, place, body):
-    """Change of the loads of a user's fields from `moved`, by half a step of the loads `kick`, and its bound [m/s²]."""
+    """Change of the load of users' fields when the loads `kick` (acceleration, torque) act for half a stage.
+
+    `moved` is their load (F, T) before, at the velocity v and the angular momentum L. `place` is (x, q, length of the
+    stage, offset_frame). The change is returned with a bound of its size, like that of `_change_of`.
+    """
     x, q, h, offset_frame = place
     v, L = plus(v, times(0.5 * h, kick[0])), plus(L, times(0.5 * h, kick[1]))
     return _change_of(
@@ -75,7 +89,11 @@ def _change_by_kick(kick, moved, v, L, place, body):
 
 @inlined
 def _is_too_much(change, size, cause, cause_size, body):
-    """True if a change of loads is too large for the explicit rule; a change that opposes its cause may be larger."""
+    """True if a change of loads is too large for the explicit midpoint rule.
+
+    `cause` are the loads whose kick has changed them, both as (acceleration, torque), and `size` and `cause_size` bound
+    the acceleration of any point by each [m/s²]. A change that opposes its cause may be twice as large as another.
+    """
     arm = body.radius * max(body.J[0], body.J[1], body.J[2])
     product = qt.dot(cause[0], change[0]) + arm * arm * qt.dot(cause[1], change[1])
     return size > (cause_size if product <= -0.5 * size * cause_size else _TURNING_SHARE * cause_size)
@@ -83,13 +101,19 @@ def _is_too_much(change, size, cause, cause_size, body):
 
 @if_user_field()
 def check_stage_resolution(y, middle, x, q, h, offset_frame, body):
-    """Note whether loads of a user's fields change too much over a stage from y; `middle` are all loads at (x, q).
+    """Set the flag `is_coarse` of a body if the loads of users' fields change too much over a stage.
 
-    Under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle: h times that is more than 2 v where
-    h Ω > 2. Half a kick changes the loads by λ h/2 of what they are. If they oppose it, as damping does, the explicit
-    rule grows from h λ = 2 on. Loads that turn with the velocity, at λ [rad/s], make it grow at any h λ. From 1 rad a
-    step on they count as not resolved, as built-in ones do. A kick by all loads says little of λ where most of them do
-    not depend on the velocity, so the change that it makes is itself taken for a kick, as a power iteration does.
+    The stage has the length h and starts at y. x and q are the pose in its middle, and `middle` is the load (F, T) of
+    all fields there. Two tests are made:
+
+    - By place: under a stiffness of frequency Ω the loads change by Ω² h v/2 until the middle. This times h is more
+      than 2 v where h Ω > 2.
+    - By velocity: half a kick changes the loads by the share λ h/2 of themselves. If the change opposes the kick, as
+      damping does, the explicit midpoint rule amplifies where h λ > 2. If the loads turn with the velocity, at λ
+      [rad/s], it amplifies at any h λ; from 1 rad a stage on they count as unresolved, as built-in fields do.
+
+    Where most loads do not depend on the velocity, the kick by all loads tells little of λ. So the change that it makes
+    is then used as a kick itself, like in a power iteration.
     """
     t = body.now
     v, L = y[2], y[3]
@@ -113,7 +137,11 @@ def check_stage_resolution(y, middle, x, q, h, offset_frame, body):
 
 @inlined
 def newton_load_change(y, end, loads, h, gyroscopic, offset_frame, body):
-    """Softened difference between the loads of a flight over h from y to `end` and `held_loads` (`implicit_loads`)."""
+    """Correction of the `loads` (acceleration, torque) that act in a flight, towards loads that agree with its end.
+
+    It is the softened difference (`implicit_loads`) between the mean loads of the flight over h from y to `end` and
+    `loads`: one step of Newton's method.
+    """
     t, half = body.now + 0.5 * h, 0.5 * h
     share = implicit_share(h * body.damping)
     v, L = lerp(y[2], end[2], share), lerp(y[3], end[3], share)
@@ -129,12 +157,15 @@ def newton_load_change(y, end, loads, h, gyroscopic, offset_frame, body):
 
 @if_declared(False)
 def is_stiff(body):
-    """True if the held loads are those of an implicit step."""
+    """True if the loads that act on the body are softened, those of an implicit step."""
     return body.is_stiff == 1
 
 
 @if_declared()
 def report_unresolved_body(is_moved, report, body):
-    """Count a body that moved while some stage of the call did not resolve its fields, or that a stage put back."""
+    """Count a body in the report if it moved while some stage of the call did not resolve its fields.
+
+    A body that a stage has put back to its place (`energy_budget`) counts, too.
+    """
     if body.is_put_back == 1 or (body.is_coarse == 1 and is_moved):
         report[body.world, at.UNRESOLVED_MOTION] += 1.0

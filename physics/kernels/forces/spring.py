@@ -4,7 +4,8 @@ With e the vector from the anchor to the point, l = |e| and u the velocity of th
 
     F = -(k (l - l0) + c u·e/l) e/l,    energy ½ k (l - l0)².
 
-Where l = 0 the direction is that of the velocity (the damper's limit), and the spring does not pull.
+k is the stiffness, l0 the rest length and c the damping. Where l = 0 the spring does not pull, and the damper has its
+limit -c u.
 
 References
 ----------
@@ -31,17 +32,20 @@ from physics.kernels.math.vector import minus, plus, times
 SPRING_POINT = 0  # body frame, from the centre of mass [m]
 SPRING_ANCHOR = 3  # world frame [m]
 SPRING_LENGTH = 6  # l0 [m]
-SPRING_STIFFNESS = 7  # k [N/m]; 0 for other bodies than the spring's
+SPRING_STIFFNESS = 7  # k [N/m]; 0 in the row of a body that the spring is not attached to
 SPRING_DAMPING = 8  # c [N s/m]
 
 # Columns of a push.
-PUSH_FORCE = 3  # [N]; 0 for other bodies than the push's
+PUSH_FORCE = 3  # [N]; 0 in the row of a body that is not pushed
 PUSH_IS_BODY_FIXED = 6  # 1: along the body axes, 0: along the world's
 
 
 @inlined
 def spring_vector(state, p):
-    """Point of the body relative to its centre of mass, vector to it from the anchor, and its length."""
+    """Geometry (arm, e, l) of a spring in the world frame [m], from the body's `FieldState` and the parameters p.
+
+    The arm goes from the centre of mass to the spring's point of the body, e from the anchor to that point; l = |e|.
+    """
     arm = qt.matvec(state.R, (p[SPRING_POINT], p[SPRING_POINT + 1], p[SPRING_POINT + 2]))
     e = minus(plus(state.x, arm), (p[SPRING_ANCHOR], p[SPRING_ANCHOR + 1], p[SPRING_ANCHOR + 2]))
     return arm, e, math.sqrt(qt.dot(e, e))
@@ -49,7 +53,10 @@ def spring_vector(state, p):
 
 @inlined
 def spring_damper_load(arm, e, l, u, p):
-    """(force, torque) at a point with velocity u, on a line along e of length l."""
+    """Force and torque about the centre of mass by a spring with damper, from its (arm, e, l) of `spring_vector`.
+
+    u is the velocity of the body's point relative to the anchor [m/s].
+    """
     if l == 0.0:
         return acting_at(arm, times(-p[SPRING_DAMPING], u))
     s = p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) + p[SPRING_DAMPING] * qt.dot(u, e) / l
@@ -58,7 +65,7 @@ def spring_damper_load(arm, e, l, u, p):
 
 @inlined
 def spring(state, p, t):
-    """(force, torque) of a spring."""
+    """Force and torque about the centre of mass by a spring to an anchor, from a `FieldState` and the parameters p."""
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
     arm, e, l = spring_vector(state, p)
@@ -67,18 +74,19 @@ def spring(state, p, t):
 
 @inlined
 def spring_energy(state, p, t):
-    """½ k (l - l0)² [J]."""
+    """Potential energy of a spring to a fixed anchor, ½ k (l - l0)² [J]."""
     _, _, l = spring_vector(state, p)
     return 0.5 * p[SPRING_STIFFNESS] * (l - p[SPRING_LENGTH]) * (l - p[SPRING_LENGTH])
 
 
 @inlined
 def mean_spring(states, p, t):
-    """(force, torque) of a spring between two states: the discrete gradient of its energy (Gonzalez 1996).
+    """Force and torque of a spring over a whole stage: the discrete gradient of its energy (Gonzalez 1996).
 
-    With e the mean of the vectors at both ends and l the mean of their lengths, F = -k (1 - l0/l) e does exactly the
-    work that the energy loses, F·(e1 - e0) = ½ k (l_0 - l0)² - ½ k (l_1 - l0)², since (e1 - e0)·(e1 + e0) = l_1² -
-    l_0².
+    `states` are the `FieldState` at the middle, the start and the end of the stage. Let e⁻ and e⁺ be the vectors along
+    the spring at start and end, and l⁻ and l⁺ their lengths. With the means e and l of both, F = -k (1 - l0/l) e does
+    exactly the work that the energy loses: F·(e⁺ - e⁻) = ½ k (l⁻ - l0)² - ½ k (l⁺ - l0)², since
+    (e⁺ - e⁻)·(e⁺ + e⁻) = l⁺² - l⁻².
     """
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO, ZERO
@@ -91,7 +99,7 @@ def mean_spring(states, p, t):
 
 @inlined
 def spring_rates(state, p, J, h):
-    """Rates of `implicit_loads`."""
+    """Rates (λ, Ω², γ) of a spring on one body: damping, squared frequency, turning (`implicit_loads`)."""
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return ZERO
     force, _ = spring(state, p, 0.0)
@@ -102,10 +110,11 @@ def spring_rates(state, p, J, h):
 
 @inlined
 def implicit_spring_stiffness(h, w, e, l, p):
-    """Direction of a spring, and Z of `implicit_loads` along and across it [kg]; w is its points' mobility [1/kg].
+    """Direction of a spring, and its stiffness Z of `implicit_loads` along and across that direction [kg].
 
-    Across the line the stiffness is that of its tension, k (1 - l0/l). A compressed spring would have a negative one,
-    which is left out.
+    h is the length of the stage, e and l are those of `spring_vector`, and w bounds the mobility of the spring's point,
+    or the sum of both points' mobilities [1/kg]. Across the direction the stiffness is k (1 - l0/l), by the tension. A
+    compressed spring would have a negative stiffness there; it is taken as 0.
     """
     spring, damper = (
         0.25 * h * h * p[SPRING_STIFFNESS],
@@ -118,7 +127,7 @@ def implicit_spring_stiffness(h, w, e, l, p):
 
 @inlined
 def soften_spring(loads, h, R, state, p, J):
-    """Softened loads of `implicit_loads`."""
+    """Soften the loads (acceleration, torque) of a stage of length h by a spring (`implicit_loads`)."""
     if p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0:
         return loads
     arm, e, l = spring_vector(state, p)
@@ -130,7 +139,10 @@ def soften_spring(loads, h, R, state, p, J):
 
 @inlined
 def push_load(state, p, t):
-    """(force, torque) of a constant force at a point of the body."""
+    """Force and torque about the centre of mass by a push: a constant force at a point of the body.
+
+    The force is constant in the world frame, or in the body frame if PUSH_IS_BODY_FIXED is set.
+    """
     force = (p[PUSH_FORCE], p[PUSH_FORCE + 1], p[PUSH_FORCE + 2])
     if p[PUSH_IS_BODY_FIXED] != 0.0:
         force = qt.matvec(state.R, force)
@@ -139,7 +151,10 @@ def push_load(state, p, t):
 
 @inlined
 def push_rates(state, p, J, h):
-    """Rates of `implicit_loads`: a force with a fixed direction in the world makes the body swing like a pendulum."""
+    """Rates (λ, Ω², γ) of a push on one body: damping, squared frequency, turning (`implicit_loads`).
+
+    A force with a fixed direction in the world makes the body swing like a pendulum.
+    """
     if p[PUSH_IS_BODY_FIXED] != 0.0:
         return ZERO
     return (
@@ -155,7 +170,7 @@ def push_rates(state, p, J, h):
 
 @inlined
 def soften_push(loads, h, R, state, p, J):
-    """Softened loads of `implicit_loads`."""
+    """Soften the loads (acceleration, torque) of a stage of length h by a push (`implicit_loads`)."""
     if p[PUSH_IS_BODY_FIXED] != 0.0:
         return loads
     force, point = (

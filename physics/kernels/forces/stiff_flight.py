@@ -1,9 +1,10 @@
-"""Flight in fields that are stiff: a step cut into parts that begin short and grow.
+"""Flight of a body in stiff fields: a flight cut into parts that begin short and grow.
 
-Damping changes a velocity during a few times 1/λ, and λ may stay as large afterwards, as it does for linear drag. So
-the first part is a share of 1/λ, and each next one is longer by a constant factor. Local errors are a share of the
-remaining velocity, which falls faster than parts grow. λ h = 10¹² takes 72 parts. The last allowed part takes the rest
-of the step, by an implicit step, when the velocity is negligible.
+Damping at the rate λ changes the velocity during a few times 1/λ; afterwards λ may still be as large, as it is for
+linear drag. So the first part has a fixed share of 1/λ, and each next part is longer by a constant factor. The local
+error of a part is a share of the remaining velocity, which falls faster than the parts grow. A flight of length h with
+λ h = 10¹² takes 72 parts. The last allowed part is the rest of the flight, by an implicit step; the velocity is
+negligible by then.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from physics.kernels.forces.held_loads import advance_clock, hold_loads, set_now
 from physics.kernels.forces.resolution_limits import newton_load_change
 from physics.kernels.math.vector import plus
 
-# First part of a step, in 1/λ; growth from part to part; parts.
+# First part of a flight, in units of 1/λ; growth from part to part; largest number of parts.
 _FIRST_PART = 0.25
 _PART_GROWTH = 1.5
 _MAX_PARTS = 72
 
-# Rounds of Newton's method for loads that agree with the end of a part, the share of the loads at which they count as
-# settled, and the one up to which they are better than those of one round.
+# Largest number of iterations of Newton's method for loads that agree with the end of a part. The iteration has
+# converged when its last change is this share of the loads; up to the second share its result is used nevertheless.
 _NEWTON_ROUNDS = 12
 _CONVERGED = 1.0e-12
 _NEARLY_CONVERGED = 1.0e-3
@@ -31,9 +32,10 @@ _NEARLY_CONVERGED = 1.0e-3
 
 @kernel
 def implicit_flight(y, h, flight, body):
-    """Flight over h from y under loads that agree with its end: discrete gradients, by Newton's method from held loads.
+    """State after a flight of h [s] from y under loads that agree with its end (discrete gradients).
 
-    A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). If the iteration does not settle, the loads of the first step are kept.
+    Newton's method finds the loads A from those that act at first: A' = A + (1 + M⁻¹ Z)⁻¹ (A(y, end) - A). If it does
+    not converge, the first loads are kept. The loads found act on the body afterwards.
     """
     start = acting_loads(body)
     size, loads = load_bound(start, body), start
@@ -55,7 +57,11 @@ def _as_it_is(end, y, h, flight, body):
 
 @if_declared(_as_it_is)
 def subdivide_stiff_flight(end, y, h, flight, body):
-    """State `end` of a flight over h from y under held loads; stiff flights are made in parts."""
+    """State after a flight of h [s] from y, which is cut into parts if its force fields are stiff.
+
+    Otherwise the state is `end`, the result of the flight under held loads. The present time of the body is the same
+    afterwards; the caller advances it.
+    """
     if body.is_stiff == 0:
         return end
     start, left, part = time_now(body), h, 0.0

@@ -1,13 +1,15 @@
 """Volume and centre of the part of a body that lies below a plane: exact for block, sphere and ellipsoid.
 
-*Sphere*: a cap of height h has V = π h² (3r - h)/3, its centre 3 (2r - h)²/(4 (3r - h)) below the sphere's.
+*Sphere*: a cap of height h of a sphere of radius r has the volume V = π h² (3r - h)/3. Its centre is
+3 (2r - h)²/(4 (3r - h)) below the sphere's.
 
-*Ellipsoid*: x = D y maps the unit sphere to it, planes to planes, volumes times det D, centres to centres.
+*Ellipsoid*: with the semi-axes D, the map x = D y takes the unit sphere to the ellipsoid, planes to planes, and centres
+to centres. It multiplies volumes by det D.
 
-*Block*: the part below the plane is a polyhedron. Cut into cones with their tip at one point o of the plane it is the
-sum over its faces of the faces' areas A and centres c: V = Σ A h/3 and V·centre = Σ (A h/3) (¾ c + ¼ o), h the
-distance of o from the face. The face in the plane has h = 0 and is never looked for; the others are rectangles cut by
-the plane. No division by a component of the normal: exact for every attitude.
+*Block*: the part below the plane is a polyhedron. It consists of cones with a common tip o, a point of the plane, over
+the faces of the polyhedron. With the area A and the centre c of each face, and the distance h of o from it, V = Σ A h/3
+and V·centre = Σ (A h/3) (¾ c + ¼ o). The face in the plane has h = 0 and is left out; the others are rectangles cut by
+the plane. Nothing is divided by a component of the normal, so the result is exact for every attitude.
 
 References
 ----------
@@ -28,14 +30,20 @@ from physics.kernels.state.layout import BLOCK
 
 @inlined
 def spherical_cap(r, height):
-    """(volume, depth of its centre below the sphere's) of a sphere's part below a plane, its centre at `height`."""
+    """Volume of the part of a sphere below a plane [m³], and the depth of its centre below the sphere's centre [m].
+
+    r is the sphere's radius, `height` the height of the sphere's centre above the plane.
+    """
     h = min(max(r - height, 0.0), 2.0 * r)
     return math.pi * h * h * (3.0 * r - h) / 3.0, 3.0 * (2.0 * r - h) * (2.0 * r - h) / (4.0 * (3.0 * r - h))
 
 
 @inlined
 def _corner(axis, side, k, d):
-    """Corner k = 0 .. 3, in turn, of a block's face at `side` of `axis`."""
+    """Corner k = 0 .. 3, in order round the edge, of the face of a block at `side` (1 or -1) of the body axis `axis`.
+
+    d are the half edges; the corner is relative to the centre, in body axes [m].
+    """
     a = d[(axis + 1) % 3] * (-1.0 if k == 0 or k == 3 else 1.0)
     b = d[(axis + 2) % 3] * (-1.0 if k < 2 else 1.0)
     c = side * d[axis]
@@ -48,7 +56,7 @@ def _corner(axis, side, k, d):
 
 @inlined
 def _triangle(p, q, r):
-    """Area, and area times centre, of a triangle."""
+    """Area of the triangle with the corners p, q, r [m²], and the area times the triangle's centre [m³]."""
     n = qt.cross(minus(q, p), minus(r, p))
     area = 0.5 * math.sqrt(qt.dot(n, n))
     return area, times(area / 3.0, plus(p, plus(q, r)))
@@ -56,7 +64,10 @@ def _triangle(p, q, r):
 
 @kernel
 def _wet_face(axis, side, n, height, d):
-    """Area, and area times centre, of the part of a face below the plane n·x = -height."""
+    """Area, and area times centre, of the part of a block's face below the plane n·x = -height, in body axes.
+
+    The face is that at `side` (1 or -1) of the body axis `axis`; d are the half edges.
+    """
     area, moment = 0.0, ZERO
     first = last = ZERO
     count = 0
@@ -86,7 +97,7 @@ def _wet_face(axis, side, n, height, d):
 
 @kernel
 def _wet_block(n, height, d):
-    """(volume, volume times centre) of the part of a block below the plane n·x = -height, body axes."""
+    """Volume, and volume times centre, of the part of a block with half edges d below n·x = -height, in body axes."""
     o = times(-height, n)
     volume, moment = 0.0, ZERO
     for axis in range(3):
@@ -107,19 +118,20 @@ def submerged_part(shape, dims, n, height):
     Parameters
     ----------
     shape : int
+        BLOCK, SPHERE or ELLIPSOID of `layout`.
     dims : tuple of 3 floats
-        [m].
+        Half edges of a block, semi-axes of an ellipsoid, or three times the radius of a sphere [m].
     n : tuple of 3 floats
         Normal of the plane, up, in body axes.
     height : float
-        Of the body's geometric centre above the plane [m].
+        Height of the body's geometric centre above the plane [m].
 
     Returns
     -------
     volume : float
-        [m³].
+        Volume of the part below the plane [m³].
     centre : tuple of 3 floats
-        Relative to the geometric centre, in body axes [m]; zero where the volume is.
+        Its centre relative to the geometric centre, in body axes [m]; zero if the volume is zero.
     """
     if shape == BLOCK:
         reach = abs(dims[0] * n[0]) + abs(dims[1] * n[1]) + abs(dims[2] * n[2])

@@ -1,9 +1,9 @@
-"""Spring and damper between two bodies: for each body a spring to an anchor that moves with the other.
+"""Spring and damper between two bodies: for each body a spring to an anchor, which is a point of the other body.
 
-The point of the other body and its velocity are numbers among the spring's columns, written (`place_anchors`) before
-the loads of either body are evaluated. Both ends see the same two points and velocities, so that their forces are
-equal and opposite to the last bit; and since the loads of a stage are those of its middle, where they act along the
-line of the two points, momentum and angular momentum of the two together are kept to rounding.
+The place and the velocity of the anchor are among the columns of the spring. They are written (`place_anchors`) before
+the loads of either body are evaluated. Both bodies use the same two points and velocities, so their forces are equal
+and opposite to the last bit. The loads of a stage are those of its middle, and act along the line between the two
+points there. So the momentum and angular momentum of the two bodies together are kept to rounding.
 """
 
 from __future__ import annotations
@@ -42,7 +42,10 @@ from physics.kernels.state.body import angular_velocity, read_state
 
 @inlined
 def linked_spring(state, p, t):
-    """(force, torque) of a spring to another body."""
+    """Force and torque on a body by a spring to another body, from its `FieldState` and the parameters p.
+
+    Both are zero if the spring is not attached to the body.
+    """
     if p[LINK_OTHER] < 0.0 or (p[SPRING_STIFFNESS] == 0.0 and p[SPRING_DAMPING] == 0.0):
         return ZERO, ZERO
     arm, e, l = spring_vector(state, p)
@@ -52,7 +55,10 @@ def linked_spring(state, p, t):
 
 @inlined
 def linked_spring_rates(state, p, J, h):
-    """Rates of `implicit_loads`, of the two ends against each other."""
+    """Rates (λ, Ω², γ) of a spring between two bodies, of the motion of its two ends relative to each other.
+
+    They are damping, squared frequency and turning (`implicit_loads`).
+    """
     if p[LINK_OTHER] < 0.0:
         return ZERO
     force, _ = linked_spring(state, p, 0.0)
@@ -63,7 +69,10 @@ def linked_spring_rates(state, p, J, h):
 
 @inlined
 def soften_linked_arm(loads, h, R, state, p, J):
-    """Torque of `implicit_loads` under the force at its arm; the other loads are softened for both ends at once."""
+    """Soften the torque of the loads (acceleration, torque): the spring's force at its arm makes the body swing.
+
+    Along and across the spring, loads are softened for both bodies at once (`implicit_two_body_spring`).
+    """
     if p[LINK_OTHER] < 0.0:
         return loads
     force, _ = linked_spring(state, p, 0.0)
@@ -73,7 +82,7 @@ def soften_linked_arm(loads, h, R, state, p, J):
 
 @inlined
 def linked_spring_energy(state, p, t):
-    """Half of ½ k (l - l0)² [J]; the other body has the other half."""
+    """Potential energy of a spring between two bodies that counts for one of them: half of ½ k (l - l0)² [J]."""
     if p[LINK_OTHER] < 0.0:
         return 0.0
     _, _, l = spring_vector(state, p)
@@ -81,14 +90,15 @@ def linked_spring_energy(state, p, t):
 
 
 def _first_columns(record) -> list[int]:
-    """First column of each spring between bodies in a body's record, or in the type of one."""
+    """First column of each spring between two bodies, in a body's record or in the type of one."""
     return [first for term, first, _ in iterate_terms(record, LOAD) if term.function is linked_spring]
 
 
 def _if_linked(where, otherwise):
-    """Make a kernel of a function of the springs' first column and number; without springs it returns `otherwise`.
+    """Decorate a kernel that is called only in scenes with springs between bodies; elsewhere it returns `otherwise`.
 
-    `where` gives the record of a body, or its type, from the function's arguments.
+    Callers leave out the function's first two arguments, the springs' first column and their number. `where` takes the
+    other arguments as a tuple, and returns the record of a body, or its type.
     """
 
     def decorate(function):
@@ -107,14 +117,20 @@ def _if_linked(where, otherwise):
 
 
 def _record(bodies):
-    """Record of a body in a group with `body` (`multibody.data.arrays.Bodies`), or its type in the group's type."""
+    """Record of one body from a group of arguments with the member `body`, or its type from the group's type.
+
+    Such a group is `LinkedWorld` or `multibody.data.arrays.Bodies`.
+    """
     body = backend.member(bodies, "body")
     return body[0] if len(getattr(body, "shape", ())) else body.dtype
 
 
 @inlined
 def _put_anchor(first, columns, x, R, v, w, mobility):
-    """Write point, velocity and mobility of the other body, in the given state, into the columns of a spring."""
+    """Write place, velocity and mobility of a spring's anchor into the spring's columns, which begin at `first`.
+
+    The other body, whose point the anchor is, has position x, rotation matrix R, velocity v and angular velocity w.
+    """
     o = first + LINK_OTHER_POINT
     r = qt.matvec(R, (columns[o], columns[o + 1], columns[o + 2]))
     place, speed = plus(x, r), plus(v, qt.cross(w, r))
@@ -126,7 +142,10 @@ def _put_anchor(first, columns, x, R, v, w, mobility):
 
 @inlined
 def _put_anchors(first, count, offset_frame, records):
-    """Place the anchors of all springs by the bodies' `read_middle`."""
+    """Write the anchors of `count` springs of each body, from the states of the bodies in the middle of the stage.
+
+    The springs' columns begin at `first`.
+    """
     for b in range(records.shape[0]):
         columns = records[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
@@ -141,9 +160,10 @@ def _put_anchors(first, count, offset_frame, records):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), False)
 def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
-    """Do `held_loads.hold_loads` for bodies tied by springs, all at once. False, and no change, without springs.
+    """Let the loads of the middle of a stage of length h act on all bodies of a world that has springs between bodies.
 
-    A body in contact keeps the velocities of the start of the stage, as in `held_loads.hold_contact_loads`.
+    Returns True; without such springs it changes nothing and returns False. A body in contact (`bodies.touched`) has
+    the velocities of the start of the stage in its middle, as in `held_loads.hold_contact_loads`.
     """
     records, half = bodies.body, 0.5 * h
     for b in range(records.shape[0]):
@@ -167,13 +187,13 @@ def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors(first, count, offset_frame, bodies):
-    """Place the anchors of all springs by the bodies' `read_middle`."""
+    """Write the anchors of all springs between bodies, from the states of the bodies in the middle of the stage."""
     _put_anchors(first, count, offset_frame, bodies.body)
 
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def place_anchors_now(first, count, offset_frame, bodies):
-    """Place the anchors of all springs at the bodies' present states."""
+    """Write the anchors of all springs between bodies, from the bodies' present states."""
     for b in range(bodies.body.shape[0]):
         write_middle(bodies.body[b], read_state(bodies.state, b))
     _put_anchors(first, count, offset_frame, bodies.body)
@@ -181,7 +201,7 @@ def place_anchors_now(first, count, offset_frame, bodies):
 
 @_if_linked(lambda arguments: _record(arguments[-1]), None)
 def unite_linked_bodies(first, count, parent, bodies):
-    """Join the islands of bodies tied by a spring, in the table from each body to the first of its island."""
+    """Join the sets of any two bodies that a spring ties, in the union-find array `parent` (`union_find`)."""
     for b in range(bodies.body.shape[0]):
         columns = bodies.body[b].columns
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
@@ -191,7 +211,7 @@ def unite_linked_bodies(first, count, parent, bodies):
 
 @inlined
 def _kick(body, half, offset_frame):
-    """Give the middle of a body half a stage's kick of all loads."""
+    """Let all loads act on the velocities of a body in the middle of the stage for the time `half` [s]."""
     x, q, v, L = read_middle(body)
     F, T = field_load(x, q, v, L, body.now + half, offset_frame, body)
     a, held = body.held_acceleration, body.held_torque
@@ -202,7 +222,10 @@ def _kick(body, half, offset_frame):
 
 @_if_linked(lambda arguments: arguments[-1], None)
 def place_anchors_of_body(first, count, i, state, bodies, body):
-    """Place the anchors of body i's springs at the present states of the other bodies of its world."""
+    """Write the anchors of the springs of the body in row i, from the present states of the other bodies of its world.
+
+    `bodies` is the number of bodies in each world, `body` the record of body i.
+    """
     for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
         if body.columns[k + LINK_OTHER] >= 0.0:
             j = i - i % bodies + int(body.columns[k + LINK_OTHER])

@@ -1,12 +1,13 @@
 """Wind: the velocity of the air, the same everywhere; steady, or with gusts.
 
-A gust is a sum of N waves per axis with phases φ of the world's own,
+A gust is a sum of N waves for each axis i, with phases φ that each world has of its own:
 
     u_i(t) = U_i + σ √(2/N) Σ_k cos(ω_k t + φ_ik),    ω_k = tan(π (k - ½)/(2N)) / τ,  k = 1 .. N.
 
-The ω_k cut the spectrum 2τ/π / (1 + (ωτ)²) into N parts of equal energy: the variance is σ² exactly, and the
-correlation over a time s is (1/N) Σ cos(ω_k s), which tends to exp(-s/τ) with N. Being smooth it can be integrated to
-any tolerance, and being a formula in t it needs no memory.
+U is the mean wind, σ the standard deviation, τ the correlation time. The ω_k cut the spectrum 2τ/π / (1 + (ωτ)²) into N
+parts of equal energy. So the variance is exactly σ², and the correlation over a time s is (1/N) Σ cos(ω_k s), which
+tends to exp(-s/τ) as N grows. The gust is smooth, so it can be integrated to any tolerance. It is a formula in t, so it
+needs no memory.
 
 References
 ----------
@@ -23,7 +24,7 @@ from physics.compiler.decorators import inlined, kernel
 
 WIND_WAVES = 8  # N
 
-# Columns.
+# Columns of the parameters p.
 WIND_MEAN = 0  # U [m/s]
 WIND_GUST = 3  # σ [m/s]
 WIND_TIME_SCALE = 4  # τ [s]
@@ -33,7 +34,7 @@ WIND_SIZE = WIND_PHASES + 3 * WIND_WAVES
 
 @inlined
 def gust_frequency(k, time_scale):
-    """ω of wave k = 0 .. N - 1 [rad/s]."""
+    """Angular frequency of the wave k = 0 .. N - 1 of a gust [rad/s], for its correlation time τ [s]."""
     return math.tan(0.5 * math.pi * (k + 0.5) / WIND_WAVES) / time_scale
 
 
@@ -47,7 +48,7 @@ def _gust(axis, p, t):
 
 @inlined
 def wind(state, p, t):
-    """Velocity of the air [m/s]."""
+    """Velocity of the air at the time t [s], world frame [m/s]; it does not depend on the body's state."""
     if p[WIND_GUST] == 0.0:
         return (p[WIND_MEAN], p[WIND_MEAN + 1], p[WIND_MEAN + 2])
     return (_gust(0, p, t), _gust(1, p, t), _gust(2, p, t))

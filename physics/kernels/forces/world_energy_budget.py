@@ -1,7 +1,8 @@
-"""`energy_budget` for worlds of many bodies: a stiff stage has one energy, that of all bodies together.
+"""Energy budget of a stiff stage in a world of many bodies (`energy_budget`), for the energy of all bodies together.
 
-Springs carry energy from body to body, and so does contact. The excess is taken from the motion of all bodies: where
-nothing but each other holds them, from that against their common centre, so that they keep their momentum.
+Springs and contacts carry energy from body to body, so only the sum is limited. The excess is taken from the motion of
+all bodies. If they are held by each other only, it is taken from their motion relative to their common centre of mass,
+so that they keep their momentum.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from physics.kernels.state.body import angular_velocity, kinetic_energy, read_st
 
 @inlined
 def _start(body):
-    """(x, q, v, L) of a body at the start of the stage."""
+    """Read the state (x, q, v, L) that a body had at the start of the stage, `body.stage_start`."""
     m = body.stage_start
     return (m[0], m[1], m[2]), (m[3], m[4], m[5], m[6]), (m[7], m[8], m[9]), (m[10], m[11], m[12])
 
@@ -42,7 +43,7 @@ def _any_is_stiff(records):
 
 @kernel
 def _potential(later, offset_frame, bodies):
-    """Energy of all fields at the present places, `later` [s] than the start of the stage [J]."""
+    """Potential energy of all fields of all bodies at their present poses, `later` [s] after the stage's start [J]."""
     place_anchors_now(offset_frame, bodies)
     total = 0.0
     for b in range(bodies.body.shape[0]):
@@ -52,7 +53,10 @@ def _potential(later, offset_frame, bodies):
 
 @if_declared()
 def note_stage_energy(offset_frame, bodies, first):
-    """Keep states and potential energy at the start of a stage, if it is stiff; `first` is the first body's record."""
+    """Store the states and the potential energy of all bodies at the start of a stage, if it is stiff for any of them.
+
+    The energy goes to the record of the first body, `first`.
+    """
     if not _any_is_stiff(bodies.body):
         return
     first.stage_energy = _potential(0.0, offset_frame, bodies)
@@ -66,7 +70,11 @@ def note_stage_energy(offset_frame, bodies, first):
 
 @kernel
 def _gain_of(b, h, offset_frame, bodies):
-    """(kinetic energy of body b beyond the work of held loads and of fields without an energy, sizes) [J]."""
+    """Gain of kinetic energy of body b in a stage of length h, less work done on it [J], and a scale of its rounding.
+
+    Subtracted is the work of held loads, and of fields without a potential energy. The scale is the sum of the sizes of
+    these energies [J].
+    """
     body, y, end = bodies.body[b], _start(bodies.body[b]), read_state(bodies.state, b)
     v, L = times(0.5, plus(y[2], end[2])), times(0.5, plus(y[3], end[3]))
     before, after = (
@@ -82,7 +90,10 @@ def _gain_of(b, h, offset_frame, bodies):
 
 @inlined
 def _common_velocities(ties, bodies):
-    """Velocity of the common centre of mass, now and at the start of the stage; zero if walls hold the bodies."""
+    """Velocity of the common centre of mass, now and at the start of the stage [m/s].
+
+    Both are zero if `ties` is 0, that is if other things than the bodies, such as walls, hold them.
+    """
     mass, p, start = 0.0, ZERO, ZERO
     for b in range(bodies.body.shape[0]):
         m = bodies.body[b].mass
@@ -95,9 +106,10 @@ def _common_velocities(ties, bodies):
 
 @kernel
 def _take(gain, ties, offset_frame, bodies):
-    """Take an energy from the motion of all bodies; where there is too little, restore the start of the stage.
+    """Take the energy `gain` [J] from the motion of all bodies relative to their common velocity.
 
-    Their common velocity is then reset to that of the start, too: the stage's result for it is as wrong as the rest.
+    If that motion has less energy, all bodies are put back to their poses at the start of the stage. They then have
+    the common velocity of the start, since that of the end is as wrong as the rest of the stage.
     """
     c, start = _common_velocities(ties, bodies)
     motion = 0.0
@@ -119,9 +131,9 @@ def _take(gain, ties, offset_frame, bodies):
 
 @if_declared()
 def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
-    """Take the energy that a stiff stage of length h created from the bodies.
+    """Take from the motion of all bodies the energy that a stiff stage of length h has created.
 
-    `ties` is 1 for bodies that are held by each other only; `first` is the first body's record.
+    `ties` is 1 if the bodies are held by each other only, else 0. `first` is the record of the first body.
     """
     if not _any_is_stiff(bodies.body):
         return
@@ -136,7 +148,7 @@ def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
 
 @if_declared()
 def report_unresolved_bodies(report, bodies, first):
-    """Count the bodies that moved while some stage of the call did not resolve their fields."""
+    """Count in the report each body that moves, if some stage of the call did not resolve its fields."""
     for b in range(bodies.body.shape[0]):
         _, _, v, L = read_state(bodies.state, b)
         report_unresolved_body(v != ZERO or L != ZERO, report, bodies.body[b])

@@ -1,1 +1,1 @@
-"""Bodies at walls: support functions, contact points, gaps, and times of flight without contact."""
+"""Geometry of bodies at walls, which are half-spaces: support functions, contact points, gaps, contact-free times."""

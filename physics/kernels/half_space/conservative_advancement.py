@@ -1,24 +1,29 @@
-"""Safe times of free flight near a wall for bodies that turn far in a step.
+"""Safe times of free flight near a wall, for bodies that turn far in a step (conservative advancement).
 
-A feature that turns by a large angle may pass through a wall and be out of it again at the end of a stage, so that a
-look at the end is not enough. All points r of a body have
+A feature that turns by a large angle may pass through a wall and be out of it again at the end of a stage. A test of
+gaps at the end would miss it. So this module bounds the gap from below at every time t of a free flight. The wall has
+the normal n; the body has the centre of mass x, the velocity v, the angular velocity ω and the angular momentum L. A
+point of the body at the arm r from its centre of mass rises along n, after t, at least by
 
-    n·r(t) >= n·r + t n·(v + ω x r) - a t²/2,    a a bound of their acceleration,
+    t n·(v + ω x r) - a t²/2,    a a bound of the acceleration of all points.
 
-and n·(ω x r) = (n x ω)·r: with k = n + t (n x ω) the lowest of them is above the wall at t at least by
+Now n·(ω x r) = (n x ω)·r. With k = n + t (n x ω), all points of a convex body are after t above the wall at least by
 
-    n·x - offset + t n·v - s(-k) - a t²/2,    s the support function,
+    n·x - offset + t n·v - s(-k) - a t²/2,    s the support function.
 
-for any convex shape. That is concave in t: a chord between a time where it is positive and one where it is not has its
-zero at a time where it is positive. The body is flown there, and looked at again (conservative advancement, Mirtich
-1996, to second order).
+This bound is concave in t. So a chord between a time where the bound is positive and a time where it is not has its
+zero at a time where the bound is positive. The body flies up to that time, and the bound is computed again
+(conservative advancement, Mirtich 1996, to second order).
 
-With the principal moments' inverses J, J² <= (J_max + J_min) J - J_max J_min between the least and the largest, so that
-|ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²: equal for a rod that turns across its axis. In Euler's equations the
-factors are between -1 and 1, |dω/dt| <= |ω|²/√3 + J_max |τ|. So a <= |a_centre| + R (1 + 1/√3) |ω|² + R J_max |τ|.
-By components along the principal axes, ρ_i the largest distance of points from axis i and w_i the bound
-min(√(J_i ω·L), J_i |L|) of |ω_i|: |ω x r| <= Σ w_i ρ_i and |dω/dt x r| <= Σ (w_j w_k + J_i |τ|) ρ_i, which is less
-where a rod turns fast about its own axis. The smaller one counts.
+The acceleration bound a comes from a bound of |ω|. Let J be the inverse principal moments, R the bounding radius and τ
+the torque. J² <= (J_max + J_min) J - J_max J_min for each of them, so |ω|² <= (J_max + J_min) ω·L - J_max J_min |L|²,
+with equality for a rod that turns across its axis. The coefficients of Euler's equations lie between -1 and 1, so
+|dω/dt| <= |ω|²/√3 + J_max |τ|. Hence a <= |a_centre| + R (1 + 1/√3) |ω|² + R J_max |τ|.
+
+A second bound goes by components along the principal axes. Let ρ_i be the largest distance of the body's points from
+axis i, and w_i = min(√(J_i ω·L), J_i |L|) a bound of |ω_i|. Then |ω x r| <= Σ w_i ρ_i and
+|dω/dt x r| <= Σ (w_j w_k + J_i |τ|) ρ_i. This is smaller where a rod turns fast about its own axis. The smaller of the
+two bounds counts.
 """
 
 from __future__ import annotations
@@ -34,16 +39,17 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.state.body import angular_velocity
 from physics.kernels.state.layout import ELLIPSOID, HULL, SPHERE, WALL_OFFSET
 
-# A body turns far where it turns by more than this within a step [rad]; less is looked for at the ends of stages.
+# A body turns far where it turns by more than this within a step [rad]; for smaller turns a test of the gaps at the
+# end of each stage suffices.
 FAR_TURN = 0.25
 
-# Cuts of a substep for what turns, at most: those for impacts are counted apart.
+# Largest number of cuts of a substep because its body turns far; cuts at impacts are counted apart.
 MAX_TURNING_CUTS = 64
 
-# Advances of one flight at most; what is left of it is for the next stage.
+# Largest number of advances of one flight; the next stage makes the rest of the flight.
 MAX_ADVANCES = 100
 
-# Chords and halvings of one advance, and the share of the gap that may be left.
+# Largest number of pairs of a chord and a halving in one advance, and the share of the gap that may be left after it.
 CHORDS = 8
 GAP_LEFT_SHARE = 0.2
 
@@ -52,21 +58,22 @@ ACCELERATION_SHARE = 1.0 + 1.0 / math.sqrt(3.0)
 
 @inlined
 def max_inv_inertia(body):
-    """Largest inverse moment of inertia [1/(kg m²)]."""
+    """Largest inverse principal moment of inertia of a body [1/(kg m²)]."""
     return max(body.J[0], max(body.J[1], body.J[2]))
 
 
 @inlined
 def is_centred(offset_frame, body):
-    """True if the geometric centre is the centre of mass."""
+    """True if the geometric centre of a body is its centre of mass."""
     return offset_frame is None or (body.center[0] == 0.0 and body.center[1] == 0.0 and body.center[2] == 0.0)
 
 
 @inlined
 def may_turn(L, h, least, offset_frame, body):
-    """True if a body of angular momentum L may turn by more than `least` [rad] in h: a cheap, safe bound.
+    """True if a body with the angular momentum L may turn by more than `least` [rad] within the time h [s].
 
-    A sphere whose centre is its centre of mass never counts as turning.
+    The test is cheap and safe: it may be true of a body that turns less, never false of one that turns more. A sphere
+    whose centre is its centre of mass never counts as turning.
     """
     if body.shape == SPHERE and is_centred(offset_frame, body):
         return False
@@ -76,7 +83,7 @@ def may_turn(L, h, least, offset_frame, body):
 
 @kernel
 def spin_bound(q, L, h, offset_frame, body):
-    """Bound of |ω| within h [rad/s]."""
+    """Upper bound of the angular speed |ω| [rad/s] in a free flight of h [s] from attitude q, angular momentum L."""
     most, least = max_inv_inertia(body), min(body.J[0], min(body.J[1], body.J[2]))
     w = angular_velocity(q, L, body, offset_frame)
     push = h * math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
@@ -97,7 +104,10 @@ def _arm(i, offset_frame, body):
 
 @kernel
 def turning_acceleration_bound(spin, q, L, h, offset_frame, body):
-    """Bound of the acceleration of points by turning within h [m/s²], from the bound `spin` of |ω|; 0 if centred."""
+    """Upper bound of the acceleration that turning gives to any point of a body within the time h [m/s²].
+
+    `spin` is the bound of |ω| from `spin_bound`. The bound is 0 for a sphere whose centre is its centre of mass.
+    """
     if body.shape == SPHERE and is_centred(offset_frame, body):
         return 0.0
     torque = math.sqrt(body.torque[0] ** 2 + body.torque[1] ** 2 + body.torque[2] ** 2)
@@ -115,13 +125,13 @@ def turning_acceleration_bound(spin, q, L, h, offset_frame, body):
 
 @inlined
 def turned_normal(n, m, t):
-    """n + t m."""
+    """Turn a wall's normal n as a body that turns at ω sees it: k = n + t m after the time t [s], with m = n x ω."""
     return (n[0] + t * m[0], n[1] + t * m[1], n[2] + t * m[2])
 
 
 @inlined
 def support_of_vector(shape, dims, R, k):
-    """s(k) of a shape that is symmetric, for k of any length."""
+    """Support function s(k) of a point-symmetric shape (block, sphere, ellipsoid), for a vector k of any length [m]."""
     if shape == SPHERE:
         return dims[0] * math.sqrt(qt.dot(k, k))
     return geo.support(shape, dims, geo.scaled_normal(shape, dims, R, k))
@@ -129,9 +139,11 @@ def support_of_vector(shape, dims, R, k):
 
 @inlined
 def bracket_safe_time(gap, rate, turning, bend, horizon):
-    """Times (before, after) between which a bound gap + rate t - (points turn) - bend t²/2 falls to zero.
+    """Times (before, after), at most `horizon` [s], between which the lower bound of a body's gap falls to zero.
 
-    Points move along the normal by at most `turning` [m/s] at first, towards the wall or away from it.
+    The bound is `gap` [m] now, and the body moves away from the wall at `rate` [m/s]. Turning changes this rate by
+    between -`turning` and `turning` [m/s]. The acceleration towards the wall is at most `bend` [m/s²]. `before` is the
+    zero with the worst turning, `after` the zero with the best.
     """
     s, u = max(0.0, turning - rate), max(0.0, turning + rate)
     before = 2.0 * gap / (s + math.sqrt(s * s + 2.0 * bend * gap))
@@ -141,19 +153,27 @@ def bracket_safe_time(gap, rate, turning, bend, horizon):
 
 @inlined
 def secant_root(low, at_low, high, at_high):
-    """Root of the chord from (low, at_low > 0) to (high, at_high < 0)."""
+    """Zero of the straight line from the point (low, at_low) to (high, at_high), with at_low > 0 > at_high."""
     return low + (high - low) * (at_low / (at_low - at_high))
 
 
 @inlined
 def mean_time(low, high):
-    """Time between low and high > low >= 0, chosen so that few halvings find a time of any size."""
+    """Mean of two times high > low >= 0: geometric where they differ by more than the factor 4, else arithmetic.
+
+    With such means few halvings find a root, whatever its order of magnitude.
+    """
     return math.sqrt(low * high) if high > 4.0 * low else 0.5 * (low + high)
 
 
 @inlined
 def _height(t, n, m, gap, rate, bend, c, R, body):
-    """Bound of the gap to a wall after t, see the module; c is the geometric centre relative to the centre of mass."""
+    """Lower bound of a body's gap to a wall after the time t of free flight [m].
+
+    n is the wall's normal and m = n x ω. `gap` and `rate` are the distance [m] and velocity [m/s] of the centre of mass
+    from the wall, and `bend` bounds the acceleration of the body's points towards it [m/s²]. c is the geometric centre
+    relative to the centre of mass, and R the body's rotation matrix.
+    """
     k = turned_normal(n, m, t)
     dims = (body.dims[0], body.dims[1], body.dims[2])
     return gap + t * (rate - 0.5 * bend * t) + qt.dot(k, c) - support_of_vector(body.shape, dims, R, k)
@@ -161,7 +181,10 @@ def _height(t, n, m, gap, rate, bend, c, R, body):
 
 @kernel
 def safe_advance(y, wall, horizon, spin, offset_frame, scratch):
-    """(gap to a wall, time within which it cannot close in free flight from y, at most `horizon`)."""
+    """Gap of a body to a wall at the state y [m], and a time of free flight within which it cannot close [s].
+
+    The time is at most `horizon`; `spin` is a bound of |ω| up to there (`spin_bound`).
+    """
     body = scratch.body
     x, q, v, L = y
     n, R, w = wall_normal(scratch.scene.walls, wall), to_matrix(q), angular_velocity(q, L, body, offset_frame)
@@ -199,7 +222,7 @@ def safe_advance(y, wall, horizon, spin, offset_frame, scratch):
 
 @inlined
 def may_reach_wall_in_flight(wall, y, h, scratch):
-    """True if the bounding sphere may touch a wall in a free flight of h."""
+    """True if the bounding sphere of a body may come within a slop of a wall in a free flight of h [s] from y."""
     body = scratch.body
     n, a = wall_normal(scratch.scene.walls, wall), body.free_acceleration
     gap = qt.dot(n, y[0]) - scratch.scene.walls[wall, WALL_OFFSET] - body.radius
@@ -209,7 +232,11 @@ def may_reach_wall_in_flight(wall, y, h, scratch):
 
 @inlined
 def remove_symmetric_spin(R, w, body):
-    """Angular velocity without the part about axes of symmetry of an ellipsoid, which moves no surface [rad/s]."""
+    """Remove from the angular velocity w [rad/s] the part about an ellipsoid's axis of symmetry.
+
+    Turning about that axis leaves the surface in place. For other shapes w is returned as it is. R is the body's
+    rotation matrix.
+    """
     d = body.dims
     if body.shape != ELLIPSOID or not (d[0] == d[1] or d[1] == d[2] or d[0] == d[2]):
         return w
@@ -222,7 +249,10 @@ def remove_symmetric_spin(R, w, body):
 
 @inlined
 def time_to_turn_far(n, y, offset_frame, body):
-    """Time in which a body turns by `FAR_TURN` about axes across n [s]; turning about n brings no point nearer."""
+    """Time in which a body turns by `FAR_TURN` about axes across a wall's normal n [s], infinite without such turning.
+
+    Turning about n itself brings no point nearer to the wall.
+    """
     w = angular_velocity(y[1], y[3], body, offset_frame)
     if is_centred(offset_frame, body):
         w = remove_symmetric_spin(to_matrix(y[1]), w, body)
@@ -233,7 +263,10 @@ def time_to_turn_far(n, y, offset_frame, body):
 
 @inlined
 def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, scratch):
-    """Time of free flight, at most h, after which a wall is at the slop or not reached [s]."""
+    """Time of free flight from y, at most h, after which the body is within a slop of a wall [s]; h if it never is.
+
+    It may be shorter where `MAX_ADVANCES` did not suffice.
+    """
     now, gone = y, 0.0
     for _ in range(MAX_ADVANCES):
         gap, step = safe_advance(now, wall, h - gone, spin, offset_frame, scratch)
@@ -248,10 +281,12 @@ def _fly_near(y, wall, h, spin, gyroscopic, offset_frame, scratch):
 
 @cold_kernel
 def limit_turning_stage(n, y, h, left, gyroscopic, offset_frame, scratch):
-    """Time, at most `left`, that a stage from y may take, so that a body that turns far passes no wall [s].
+    """Longest time, at most `left`, of a stage from y in which a body that turns far cannot pass through a wall [s].
 
-    In contact (n > 0) the free flight of the bound does not apply; then the body turns at most as far as a test at the
-    end can judge. The same holds for features on a wall that others touch.
+    `n` is the number of contacts in the set, h the length of the substep, and `left` the part of it that is left. In
+    flight the body may go as far as `safe_advance` allows. In contact (n > 0) its flight is not known; then it may turn
+    by `FAR_TURN` at most, so that a test of gaps at the end of the stage suffices. So may a body that is already at a
+    wall.
     """
     spin = spin_bound(y[1], y[3], h, offset_frame, scratch.body)
     if not spin * h > FAR_TURN:

@@ -1,4 +1,4 @@
-"""Features of a body: contact points relative to its centre of mass, and their motion over the body."""
+"""Contact points of a body relative to its centre of mass, and their motion over the body, for each of its features."""
 
 from __future__ import annotations
 
@@ -12,31 +12,40 @@ from physics.kernels.state.layout import BLOCK, SPHERE, WALL_NORMAL, WALL_TANGEN
 
 @inlined
 def wall_of(slot, scene):
-    """Wall of a contact, by a shift: `features`, 8 or 1, is a power of two, and a division would be too slow."""
+    """Index of the wall in a contact slot, wall * features + feature.
+
+    The number of features is 8 or 1, a power of two: a shift takes the place of a slow division.
+    """
     return slot >> scene.feature_bits
 
 
 @inlined
 def feature_of(slot, scene):
-    """Feature of the body in a contact."""
+    """Index of the body's feature in a contact slot, wall * features + feature."""
     return slot & (scene.features - 1)
 
 
 @inlined
 def wall_normal(walls, k):
-    """Unit normal of wall k."""
+    """Unit normal of wall k, out of the wall, world frame."""
     return (walls[k, WALL_NORMAL], walls[k, WALL_NORMAL + 1], walls[k, WALL_NORMAL + 2])
 
 
 @inlined
 def center_arm(R, body):
-    """Geometric centre of a body relative to its centre of mass, world frame [m]; with `offset_frame` only."""
+    """Geometric centre of a body relative to its centre of mass, world frame [m].
+
+    R is the body's rotation matrix. `body.center` is only set where the scene has the switch `offset_frame`.
+    """
     return qt.matvec(R, (body.center[0], body.center[1], body.center[2]))
 
 
 @inlined
 def geometric_center(x, R, body, offset_frame):
-    """Geometric centre of a body whose centre of mass is at x [m] (the same unless `offset_frame`)."""
+    """Geometric centre of a body whose centre of mass is at x, world frame [m].
+
+    The two coincide where the switch `offset_frame` is None.
+    """
     if offset_frame is None:
         return x
     r = center_arm(R, body)
@@ -50,9 +59,10 @@ def _plus(a, b):
 
 @inlined
 def ellipsoid_point_and_rate(dims, R, w, n):
-    """Point of an ellipsoid with the normal -n from its centre, and its rate of change, world frame [m, m/s].
+    """Lowest point r of an ellipsoid above a wall of normal n, relative to its centre, and dr/dt [m, m/s].
 
-    r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω).
+    The point wanders over the body as it turns at the angular velocity w. With the semi-axes D = diag(dims),
+    r = R c with c = -D e/s, e = D Rᵀ n, s = |e| and de/dt = D (Rᵀn x Rᵀω). All vectors are in the world frame.
     """
     nb, wb = qt.transposed_matvec(R, n), qt.transposed_matvec(R, w)
     e = (dims[0] * nb[0], dims[1] * nb[1], dims[2] * nb[2])
@@ -72,7 +82,10 @@ def ellipsoid_point_and_rate(dims, R, w, n):
 
 @inlined
 def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, body):
-    """Contact point relative to the centre of mass, and its rate of change, world frame [m, m/s]."""
+    """Contact point of a feature at a wall of normal n, relative to the centre of mass, and its rate of change.
+
+    R is the body's rotation matrix and w its angular velocity [rad/s]; world frame [m, m/s].
+    """
     if shape == BLOCK:
         r = geo.vertex_arm(dims, R, feature)
         if offset_frame is not None:
@@ -85,7 +98,10 @@ def contact_arm_and_rate(shape, dims, R, w, n, feature, offset_frame, body):
 
 @inlined
 def place_arms(n, R, offset_frame, scratch):
-    """Contact points of the set at this pose: `contacts.arm`, relative to the centre of mass, world frame [m]."""
+    """Write the arms of the n contacts of the set into `contacts.arm`, for a body with the rotation matrix R.
+
+    An arm is the contact point relative to the centre of mass, world frame [m].
+    """
     scene, body, contacts = scratch.scene, scratch.body, scratch.contacts
     walls, shape = scene.walls, body.shape
     dims = (body.dims[0], body.dims[1], body.dims[2])
@@ -104,13 +120,13 @@ def place_arms(n, R, offset_frame, scratch):
 
 @inlined
 def wall_axis(walls, wall, first):
-    """Three columns of a wall's row: its normal or a tangent."""
+    """Axis of a wall from the column `first` of its row, WALL_NORMAL or a WALL_TANGENT: its unit normal or tangent."""
     return (walls[wall, first], walls[wall, first + 1], walls[wall, first + 2])
 
 
 @inlined
 def wall_axes(walls, wall):
-    """Normal and the two tangents of a wall."""
+    """Unit normal and two unit tangents of a wall, a right-handed frame."""
     return (
         wall_axis(walls, wall, WALL_NORMAL),
         wall_axis(walls, wall, WALL_TANGENT_1),
@@ -120,5 +136,5 @@ def wall_axes(walls, wall):
 
 @inlined
 def contact_arm(contacts, i):
-    """Arm of contact i from the centre of mass [m]."""
+    """Arm of contact i: from the centre of mass to the contact point, world frame [m]."""
     return (contacts.arm[i, 0], contacts.arm[i, 1], contacts.arm[i, 2])

@@ -1,4 +1,4 @@
-"""Contact set of one body: the features that take part, and their gaps and speeds."""
+"""Contact set of one body at walls: the features that take part in a stage, with their gaps and normal speeds."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from physics.kernels.state.body import angular_velocity
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, law_parameter
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, VERTEX_COUNT, WALL_OFFSET
 
-# Slops within which what approaches has arrived. Features that touched together may be two slops apart, and the place
-# of the first one's impact is half a slop off: an edge that comes down again does so with both its ends at once.
+# A feature that approaches its wall counts as arrived within this many slops. Features that touched together may be two
+# slops apart, and the place of the first one's impact is half a slop off. So an edge that lands again does so with both
+# of its ends at once.
 SIMULTANEOUS_SLOPS = 3.0
 
-_stiffness = law_parameter(LAW_STIFFNESS)  # of contact that gives (`compliance`)
+_stiffness = law_parameter(LAW_STIFFNESS)  # of compliant contact [N/m] (`compliance`), 0 where contact is rigid
 
 
 @inlined
 def is_flight_clear(x, v, h, scratch):
     """True if the bounding sphere stays clear of every wall during a free flight of h from x with velocity v.
 
-    The gap of the sphere is a parabola in time. Its lower bound is the start minus the largest losses by velocity and
-    by acceleration. A contact can matter only when this is false.
+    The gap of the sphere is a parabola in time. Its lower bound is the gap at the start, less the largest losses by
+    velocity and by acceleration. Contacts need to be looked for only when the result is false.
     """
     walls, a = scratch.scene.walls, scratch.body.free_acceleration
     half = 0.5 * h * h
@@ -39,12 +40,15 @@ def is_flight_clear(x, v, h, scratch):
 
 @inlined
 def _admit(gap, speed, slop, reach, soft, slot, h, memory, scratch):
-    """True if a feature belongs to the contact set of this stage.
+    """True if a feature with this gap [m] and normal speed [m/s] belongs to the contact set of a stage of length h.
 
-    A feature belongs to the set in three cases. It touches (gap <= slop). Or its speed at the wall is at most `soft`,
-    that of a fall from rest in the step, and of features at rest (`target_velocity.set_impact_targets`). Or loads can
-    bring it to the wall within the step, and it pushed in the last stage (`persistent_contacts`), or this is the last
-    stage that the substep may have.
+    A feature belongs to the set in three cases:
+
+    - It touches: gap <= slop, or three slops if it approaches.
+    - It approaches, and would meet the wall at a speed of at most `soft` [m/s]. Loads could have made it as fast within
+      the stage, so it has no impact (`target_velocity.set_impact_targets`).
+    - It can get to the wall within the stage, `reach` [m] being the distance by loads, and either it pushed in the last
+      stage (`persistent_contacts`), or this is the last stage that the substep may have.
     """
     if gap <= slop or (gap <= SIMULTANEOUS_SLOPS * slop and speed < 0.0):
         return True
@@ -57,13 +61,17 @@ def _admit(gap, speed, slop, reach, soft, slot, h, memory, scratch):
 
 @inlined
 def _admission_bounds(v, w, h, scratch):
-    """Bounds of `_admit`: way and speed that loads can give a feature, and the largest gap."""
+    """Bounds that a stage of length h has in `_admit`, for a body with velocity v and angular velocity w.
+
+    Returns (reach, soft, near): the distance [m] and the speed [m/s] that loads can give a feature within h, and a gap
+    [m] beyond which no feature belongs to the set.
+    """
     body = scratch.body
     slop, acceleration = body.slop, body.acceleration
     if _stiffness(body) > 0.0:  # springs push where there is no gap left
         acceleration = 0.0
     reach, soft = 0.5 * acceleration * h * h, acceleration * h
-    # Nor is what would rebound for longer than its share of the step.
+    # A contact whose rebound would last longer than `rest_share` of the stage has an impact: it needs a lower `soft`.
     if body.restitution > scratch.settings.rest_share:
         soft *= scratch.settings.rest_share / body.restitution
     near = max(slop + reach, SIMULTANEOUS_SLOPS * slop)
@@ -76,9 +84,10 @@ def _admission_bounds(v, w, h, scratch):
 
 @inlined
 def _write_vertices(d, vn, e, mb, scratch):
-    """Write gap [m] and normal velocity [m/s] of each vertex of a block at one wall, four at a time.
+    """Write gap [m] and normal velocity [m/s] of each vertex of a block at one wall into `contacts.vertices`.
 
-    d and vn are those of the centre, e and mb the normal and n x ω in the body frame, e times the half edges.
+    d and vn are gap and normal velocity of the block's centre. e is the wall's normal n in the body frame, times the
+    half edges (`scaled_normal`); mb is n x ω in the body frame. Four vertices are computed at a time.
     """
     body, contacts = scratch.body, scratch.contacts
     lower, upper = geo.vertex_heights(e)
@@ -91,7 +100,9 @@ def _write_vertices(d, vn, e, mb, scratch):
 
 @inlined
 def collect_wall_contacts(y, w, h, offset_frame, memory, scratch):
-    """Fill `scratch` (slot, gap, speed, mask, and the maxima widest and approach) with the contact set at this pose.
+    """Find the contact set of a body in the state y, and write it into `scratch.contacts`.
+
+    Written are slot, gap and speed of each contact, the mask of each wall, and the maxima `widest` and `approach`.
 
     Parameters
     ----------
@@ -100,7 +111,9 @@ def collect_wall_contacts(y, w, h, offset_frame, memory, scratch):
     w : tuple of 3 floats
         Angular velocity, world frame [rad/s].
     h : float
-        Time that the stage is to cover [s].
+        Length of the stage [s].
+    memory : (rows, ...) float64
+        Contacts of the last stage of each body (`persistent_contacts`).
 
     Returns
     -------
@@ -163,9 +176,10 @@ def _record(count, wall, feature, features, gap, speed, contacts):
 
 @inlined
 def check_penetration(x, R, offset_frame, scratch):
-    """Find features behind walls: (one outside the contact set, by more than half a slop; any, by a slop).
+    """Test a body at position x, with the rotation matrix R, for features inside walls: (has_passed, is_deep).
 
-    After a feature outside the set is found, the other walls are skipped: both results are true then.
+    `has_passed` is true if a feature outside the contact set is deeper than half a slop in a wall; `is_deep` if any
+    feature is deeper than a slop. The first feature that has passed ends the test, and both results are then true.
     """
     body = scratch.body
     walls, shape, least = scratch.scene.walls, body.shape, -0.5 * body.slop
@@ -193,9 +207,10 @@ def check_penetration(x, R, offset_frame, scratch):
 
 @kernel
 def nearest_outside_set(x, R, offset_frame, scratch):
-    """Smallest gap [m] over all features outside the contact set, and the slot of its feature.
+    """Smallest gap [m] of all features outside the contact set, at position x and rotation R, and that feature's slot.
 
-    For a wall out of the bounding sphere's reach the sphere's gap is used: a lower bound, and positive (slot -1).
+    Where a wall is beyond the bounding sphere, the gap of the sphere takes the place of its features' gaps: a lower
+    bound, which is positive. Its slot is -1.
     """
     body = scratch.body
     walls, features, shape, radius = scratch.scene.walls, scratch.scene.features, body.shape, body.radius
@@ -225,7 +240,7 @@ def nearest_outside_set(x, R, offset_frame, scratch):
 
 @kernel
 def feature_gap(slot, x, R, offset_frame, scratch):
-    """Gap [m] of one feature to its wall."""
+    """Gap [m] of the feature of a contact slot to its wall, for a body at position x with the rotation matrix R."""
     scene, body = scratch.scene, scratch.body
     walls, shape = scene.walls, body.shape
     dims = (body.dims[0], body.dims[1], body.dims[2])
@@ -239,7 +254,10 @@ def feature_gap(slot, x, R, offset_frame, scratch):
 
 @kernel
 def feature_gap_rate(slot, y, offset_frame, scratch):
-    """Rate of the gap of one feature [m/s]: its normal velocity. A wandering point wanders along the wall."""
+    """Rate of the gap of a slot's feature in the state y [m/s]: the normal velocity of its contact point.
+
+    The contact point of an ellipsoid wanders over the body, but along the wall: that does not change the gap.
+    """
     scene, body = scratch.scene, scratch.body
     _, q, v, L = y
     walls, R, shape = scene.walls, qt.to_matrix(q), body.shape
@@ -258,7 +276,10 @@ def feature_gap_rate(slot, y, offset_frame, scratch):
 
 @inlined
 def project_out_of_walls(x, R, offset_frame, scratch):
-    """Position moved along the normals until no point is deeper than the slop in a wall. No velocity changes."""
+    """Move the position x out of walls, along their normals, so that a body deeper than the slop is half a slop deep.
+
+    R is the body's rotation matrix; the new position is returned, and no velocity changes.
+    """
     body = scratch.body
     walls, shape, radius, slop = scratch.scene.walls, body.shape, body.radius, body.slop
     dims = (body.dims[0], body.dims[1], body.dims[2])

@@ -1,4 +1,7 @@
-"""Gaps and contact points of a state without a step, and conversion of momenta to and from the stored form."""
+"""Compute gaps, contact points and spring energies of states without a step, and angular momenta from velocities.
+
+`rows` are indices world * body_count + body of the arrays `state` and `params` (`physics.kernels.state.layout`).
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from physics.kernels.state import layout as at
 
 @kernel
 def principal_matrix(state, params, i):
-    """Rotation matrix (9 scalars) from the principal frame of row i to the world."""
+    """Rotation matrix (9 scalars, row by row) from the principal frame of the body in row i to the world."""
     q = (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3])
     p = at.PRINCIPAL
     return qt.to_matrix(qt.multiply(q, (params[i, p], params[i, p + 1], params[i, p + 2], params[i, p + 3])))
@@ -18,7 +21,7 @@ def principal_matrix(state, params, i):
 
 @entry_kernel
 def write_angular_momenta(rows, state, params):
-    """Write L = R I Rᵀ ω [kg m²/s] into the given rows of `state` from their ω."""
+    """Write angular momenta L = R I Rᵀ ω [kg m²/s] into the given rows of `state`, from their angular velocities ω."""
     for k in range(rows.shape[0]):
         i = rows[k]
         w = (state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2])
@@ -33,7 +36,10 @@ def write_angular_momenta(rows, state, params):
 
 @entry_kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
-    """Smallest gap [m] of each given row over all walls, and its wall (-1 without walls); not of hulls."""
+    """Find the smallest gap of each given row over all walls; hulls are not supported.
+
+    Written are `gaps` (len(rows),) [m] and `which` (len(rows),), the index of the wall, or -1 without walls.
+    """
     for k in range(rows.shape[0]):
         i = rows[k]
         x = (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2])
@@ -55,7 +61,10 @@ def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
 
 @entry_kernel
 def contact_spring_energies(state, params, shapes, walls, column, energies):
-    """Energy [J] of the springs of contact, ½ k g² of each point with a gap g < 0, of every row; k in `column`."""
+    """Write the energy of the contact springs of every row into `energies` (rows,) [J].
+
+    Each feature with a gap g < 0 to a wall stores ½ k g². The stiffness k [N/m] is in column `column` of `params`.
+    """
     for i in range(state.shape[0]):
         shape, energies[i] = shapes[i % shapes.shape[0]], 0.0
         point = (0.0, 0.0, 0.0)
@@ -69,7 +78,10 @@ def contact_spring_energies(state, params, shapes, walls, column, energies):
 
 @kernel
 def feature_point(state, params, shape, n, i, feature):
-    """World position [m] of a feature (see `layout.VERTEX_COUNT`) of row i towards the normal n of a wall."""
+    """World position [m] of a feature of row i at a wall of normal n.
+
+    A block's features are its vertices 0 to 7. A sphere or an ellipsoid has the feature 0, its lowest point along n.
+    """
     R = qt.to_matrix((state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]))
     d = (params[i, at.DIMENSIONS], params[i, at.DIMENSIONS + 1], params[i, at.DIMENSIONS + 2])
     if shape == at.BLOCK:
@@ -83,6 +95,6 @@ def feature_point(state, params, shape, n, i, feature):
 
 @entry_kernel
 def contact_point(state, params, shapes, walls, i, wall, feature, out):
-    """Write `feature_point` of the feature of row i towards a wall into out (3,)."""
+    """Write the world position [m] of a feature of row i at the given wall into `out` (3,), by `feature_point`."""
     n = (walls[wall, at.WALL_NORMAL], walls[wall, at.WALL_NORMAL + 1], walls[wall, at.WALL_NORMAL + 2])
     out[0], out[1], out[2] = feature_point(state, params, shapes[i % shapes.shape[0]], n, i, feature)

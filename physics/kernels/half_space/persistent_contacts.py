@@ -1,9 +1,9 @@
-"""Contacts that continue from one resting stage to the next.
+"""Persistent contacts: contacts that continue from one resting stage to the next.
 
-A resting stage asks for no normal velocity at its end, and knows how its contacts turn until then to first order. It
-leaves of a stage of length h a normal speed of h² and a gap of h³, of either sign. These are errors of the scheme, no
-events: a contact that pushed in the last stage, and that the smooth motion presses against its wall still, has neither
-left it nor hit it.
+A resting stage aims at normal velocities of zero at its end, and knows only to first order how its contacts turn until
+then. So a stage of length h leaves a contact with a normal speed of order h² and a gap of order h³, of either sign.
+These are errors of the scheme, not events. A contact that pushed in the last stage, and that loads and turning still
+press against its wall, has neither left the wall nor hit it.
 """
 
 from __future__ import annotations
@@ -14,22 +14,25 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.state.body import angular_velocity, apply_inv_inertia, principal_attitude
 from physics.kernels.state.layout import ELLIPSOID
 
-# Row of `memory`: length of the last resting stage [s], its contact count, which direct solve worked last
-# (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of its contacts, then the impulses of all slots,
-# zero where there is no contact.
+# Row of a body in `memory`: length of its last resting stage [s], number of contacts in that stage, the direct solver
+# that succeeded last (`sliding_patch.TRY_STICKING`, `TRY_SLIDING`, `TRY_MIXED`), the slots of these contacts, then
+# three impulses [N s] for every possible slot, zero where there was no contact.
 WALL_MEMORY_STAGE, WALL_MEMORY_COUNT, WALL_MEMORY_MODE = range(3)
 WALL_MEMORY_HEAD = 3
 
 
 @inlined
 def last_normal_impulse(slot, memory, scratch):
-    """Normal impulse of a feature in the last stage of its body [N s]; 0 if that was in the air."""
+    """Normal impulse of the workspace's body at a contact slot in its last stage [N s]; 0 without contact there."""
     return memory[scratch.body.i, WALL_MEMORY_HEAD + scratch.contacts.slot.shape[0] + 3 * slot]
 
 
 @kernel
 def free_gap_acceleration(slot, y, offset_frame, scratch):
-    """Acceleration of a feature's gap without contact, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²]; negative if it is pressed."""
+    """Acceleration of the gap of a slot's feature without contact impulses, n·(v̇ + ω̇ x r + ω x ṙ) [m/s²].
+
+    It is negative where loads and turning press the feature against its wall. y is the state of the body.
+    """
     scene, body = scratch.scene, scratch.body
     _, q, _, L = y
     n, a, torque = wall_normal(scene.walls, wall_of(slot, scene)), body.free_acceleration, body.torque
@@ -45,7 +48,10 @@ def free_gap_acceleration(slot, y, offset_frame, scratch):
 
 @cold_kernel
 def is_still_pressed(gap, slot, y, h, offset_frame, memory, scratch):
-    """True if a round body that pushed in the last stage is still pressed, so that its gap closes."""
+    """True if an ellipsoid pushed at this slot in the last stage, and loads and turning bring it back within h [s].
+
+    Back means within the slop: `gap` [m] is the gap now, y the state.
+    """
     if not (scratch.body.shape == ELLIPSOID and last_normal_impulse(slot, memory, scratch) > 0.0):
         return False
     return gap + 0.5 * h * h * min(free_gap_acceleration(slot, y, offset_frame, scratch), 0.0) <= scratch.body.slop
@@ -53,10 +59,11 @@ def is_still_pressed(gap, slot, y, h, offset_frame, memory, scratch):
 
 @inlined
 def turning_acceleration(w, body):
-    """Largest acceleration that turning at w alone gives to a contact along its normal [m/s²].
+    """Bound of the normal acceleration that turning at the angular velocity w gives to a contact point [m/s²].
 
-    |n·(ω x ṙ)| <= ω² ρ with the largest radius ρ of curvature of an ellipsoid, its largest half-axis squared by its
-    smallest; of a vertex ω² times its distance. (n·(α x r) of free turning is at most as much again.)
+    For an ellipsoid |n·(ω x ṙ)| <= ω² ρ, with its largest radius of curvature ρ, the square of its largest half-axis
+    over its smallest. For a vertex the bound is ω² times its distance from the centre of mass, at most the bounding
+    radius. The term n·(ω̇ x r) of free turning is left out; it is at most as large.
     """
     reach = body.radius
     if body.shape == ELLIPSOID:
@@ -66,9 +73,9 @@ def turning_acceleration(w, body):
 
 @kernel
 def is_persistent_contact(i, y, h, offset_frame, memory, scratch):
-    """True if the speed of contact i is an error of the last stage: it pushed then, and is at most that fast.
+    """True if contact i pushed in the last stage, and its normal speed is small enough to be an error of that stage.
 
-    A stage of length h may leave a sticking contact with the speed that loads and turning give in h.
+    A stage of length h may leave a sticking contact with at most the speed that loads and turning give within h.
     """
     body = scratch.body
     if not last_normal_impulse(scratch.contacts.slot[i], memory, scratch) > 0.0:
@@ -79,14 +86,15 @@ def is_persistent_contact(i, y, h, offset_frame, memory, scratch):
 
 @kernel
 def cancel_separation(y, h, offset_frame, memory, scratch):
-    """State with the one contact of the set at rest along its normal, and whether it has changed.
+    """Stop the only contact of the set if it leaves its wall by an error of the last stage: (new state, has_changed).
 
-    The state changes only if the contact continues, but would not be brought back within h.
+    The state y changes only if the contact is persistent, is pressed against its wall by loads and turning, but would
+    not be back at the wall within h [s].
 
-    A contact that leaves at u after a push p, though it is still pressed against its wall, got u/(n·W n) too much. A
-    smaller push of the next stage usually compensates for that. If u is more than the motion without a push can reverse
-    within h, this excess is taken back, at most p, so that both pushes together stay positive. `contacts.rebound` holds
-    the old impulse.
+    Such a contact got a push in the last stage that was too large by u/w, with u its speed and w its mobility. A
+    smaller push of the next stage usually makes up for it. Where that push would have to pull, this excess is taken
+    back now. At most all of the last push is taken, so that the sum of both stays positive. `contacts.rebound` gets the
+    impulse that was taken, as a negative number [N s].
     """
     body, contacts = scratch.body, scratch.contacts
     x, q, v, L = y

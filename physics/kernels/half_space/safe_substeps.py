@@ -1,4 +1,4 @@
-"""Time within which a body in flight cannot reach a wall and needs no collision detection."""
+"""Count the substeps in which a body in flight cannot reach a wall and needs no collision detection."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from physics.kernels.half_space.contact_set import is_flight_clear
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import WALL_OFFSET
 
-# Substeps without a look at least: fewer are not worth finding out how many. And at most, with what rounding adds up to
-# in as many, relative to the coordinates: a handful of operations, 2⁻⁵³ each, in each of them.
+# Fewest substeps that are worth counting, and most that are counted. In as many substeps rounding adds up to at most
+# _ROUNDING, relative to the coordinates: each substep has a handful of operations with an error of 2⁻⁵³ each.
 _MIN_SUBSTEPS = 4
 _MAX_SUBSTEPS = 1 << 20
 _ROUNDING = 2.0**-28
@@ -22,18 +22,21 @@ _FAR = 1.0e300
 
 @inlined
 def _size(a):
-    """Sum of absolute values."""
+    """Sum of the absolute values of a vector's components, an upper bound of its length."""
     return abs(a[0]) + abs(a[1]) + abs(a[2])
 
 
 @inlined
 def count_clear_substeps(x, v, h, left, scratch):
-    """Number of substeps of h, of `left`, in which free flight from x with velocity v meets no wall; 0 if unknown.
+    """Number of the next substeps of length h [s] in which free flight from x with velocity v meets no wall.
 
-    The first is `is_flight_clear`'s. It would say the same of the next ones, as long as the acceleration stays what it
-    is: with s and c the parts of velocity and acceleration towards a wall, its gap, and the bound for that at any time
-    before, loses at most s t + c t²/2 in t. Half of each gap is spent on this, the other half is left for rounding, and
-    for textbook schemes, which go up to c t h/2 further: to leave out looks changes nothing.
+    At most `left` substeps are counted, and none (0) where the first substep may already meet a wall. Results with and
+    without the count have the same bits: `is_flight_clear` would be true of each counted substep.
+
+    The first substep is tested by `is_flight_clear`. For more of them the acceleration must be constant, so a body in
+    force fields gets 1. Let s and c be the parts of velocity and acceleration towards a wall. Within the time t the gap
+    loses at most s t + c t²/2. Half of each gap may be lost that way. The other half is left for rounding, and for
+    textbook schemes, which go up to c t h/2 further.
     """
     body = scratch.body
     if not is_flight_clear(x, v, h, scratch):

@@ -1,9 +1,10 @@
-"""Distance of block, sphere and ellipsoid to a half-space, and the points in contact.
+"""Support functions of block, sphere and ellipsoid, which give their gap to a wall and their contact points.
 
 For a convex body with support function s(n) = max over its points r of n·r
-(relative to the centre of mass) the gap to the wall {x : n·x >= offset} is
+(relative to its geometric centre x) the gap to the wall {x : n·x >= offset} is
 n·x - offset - s(-n); all three shapes are symmetric, so s(-n) = s(n). With
-e_k = dimension_k (R^T n)_k it is Σ|e_k| for a block, √Σe_k² for an ellipsoid.
+e_k = dimension_k (R^T n)_k, s(n) is Σ|e_k| for a block and √Σe_k² for an ellipsoid.
+The dimensions are half edges, semi-axes, or three times the radius of a sphere.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ from physics.compiler.simd import Lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import BLOCK, SPHERE, VERTEX_COUNT
 
-# Bit j of the number of a vertex is set where the vertex is on the + side of body axis j.
+# Signs of the coordinates of a block's vertices. Bit j of a vertex's number is set if it is on the + side of axis j.
 VERTEX_SIGNS = np.array([[1.0 if vertex >> j & 1 else -1.0 for j in range(3)] for vertex in range(VERTEX_COUNT)])
 
 
 @inlined
 def scaled_normal(shape, dims, R, n):
-    """e_k = dimension_k (R^T n)_k [m]; a sphere needs no rotation."""
+    """Normal n in the body frame, times the dimensions: e_k = dimension_k (Rᵀ n)_k [m]; a sphere needs no rotation."""
     if shape == SPHERE:
         return (dims[0] * n[0], dims[0] * n[1], dims[0] * n[2])
     nb = qt.transposed_matvec(R, n)
@@ -32,7 +33,7 @@ def scaled_normal(shape, dims, R, n):
 
 @inlined
 def support(shape, dims, e):
-    """Support function s(n) [m] from `scaled_normal`."""
+    """Support function s(n) of a block, sphere or ellipsoid [m], from e = `scaled_normal` of n."""
     if shape == BLOCK:
         return abs(e[0]) + abs(e[1]) + abs(e[2])
     if shape == SPHERE:
@@ -42,7 +43,7 @@ def support(shape, dims, e):
 
 @inlined
 def vertex_height(e, k):
-    """n·r of vertex k of a block relative to its centre [m] (`VERTEX_SIGNS`)."""
+    """Height n·r of vertex k of a block, r from its centre [m], from e = `scaled_normal` of n."""
     h = e[0] if k & 1 else -e[0]
     h += e[1] if k & 2 else -e[1]
     h += e[2] if k & 4 else -e[2]
@@ -51,14 +52,14 @@ def vertex_height(e, k):
 
 @inlined
 def vertex_heights(e):
-    """`vertex_height` of all eight: those of the vertices 0 to 3, and of 4 to 7."""
+    """Heights n·r of all eight vertices of a block [m], as two groups of four lanes: vertices 0 to 3, then 4 to 7."""
     h = Lanes(-1.0, 1.0, -1.0, 1.0) * e[0] + Lanes(-1.0, -1.0, 1.0, 1.0) * e[1]
     return h - e[2], h + e[2]
 
 
 @inlined
 def vertex_arm(dims, R, k):
-    """Vertex k of a block relative to its centre, world frame [m]."""
+    """Vertex k of a block relative to its centre, world frame [m]; `dims` are its half edges."""
     return qt.matvec(
         R,
         (
@@ -71,9 +72,9 @@ def vertex_arm(dims, R, k):
 
 @inlined
 def support_arm(shape, dims, R, n, e):
-    """Point of a sphere or ellipsoid that is nearest to the wall, relative to its centre, world frame [m].
+    """Point of a sphere or ellipsoid nearest to a wall of normal n, relative to its centre, world frame [m].
 
-    The ellipsoid's point of normal -n is -R D² Rᵀ n / s with D = diag(semi-axes).
+    e is `scaled_normal` of n. On an ellipsoid the point is -R D² Rᵀ n / s(n), with D = diag(semi-axes).
     """
     if shape == SPHERE:
         return (-dims[0] * n[0], -dims[0] * n[1], -dims[0] * n[2])

@@ -1,1 +1,1 @@
-"""Linear complementarity problems: pivoting methods, and the certificate of a solution."""
+"""Solve linear complementarity problems by pivoting: Lemke's and Dantzig's methods, and the check of a solution."""

@@ -1,10 +1,10 @@
 """Cholesky factor of the clamped rows and columns of a matrix, updated as indices are added and removed.
 
-`floats` holds the factor in its first n rows and the matrix, with a diagonal scaled
-to [1/4, 1), in the next n. `index` holds the clamped indices in the order of the
-factor, then for every index its place there, negative if it is not clamped.
-An index joins by a new row of the factor; where one leaves, the rows behind it
-are computed anew from the matrix, so that no error is ever carried along.
+Clamped indices are those of contacts that push in Dantzig's method (`dantzig`). `floats` holds the factor in its first
+n rows and the matrix, with a diagonal scaled to [1/4, 1), in the next n. `index` holds the clamped indices in the order
+of the factor, then for every index its place there, negative if it is not clamped. An index is added by a new row of
+the factor. When an index is removed, the rows behind it are computed anew from the matrix, so that errors do not
+accumulate.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ import math
 
 from physics.compiler.decorators import kernel
 
-DEPENDENT_TOLERANCE = 2.0**-40  # of its diagonal: an index with a smaller Schur complement is dependent
+# An index is dependent on the clamped ones if its Schur complement is at most this share of its diagonal entry.
+DEPENDENT_TOLERANCE = 2.0**-40
 
 
 @kernel
 def clamp_index(floats, index, n, count, k):
-    """Append index k to the `count` clamped ones: one row of the Cholesky factor.
+    """Append index k to the `count` clamped ones, and its row to the Cholesky factor; n is the size of the problem.
 
-    Returns whether k is independent of them; if not, nothing but scratch space has changed.
+    Returns False if k depends linearly on the clamped indices; then it is not added.
     """
     factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
     schur = A[k, k]
@@ -41,7 +42,7 @@ def clamp_index(floats, index, n, count, k):
 
 @kernel
 def release_index(floats, index, n, count, k):
-    """Remove index k from the clamped ones and rebuild the factor behind it. Returns the new count."""
+    """Remove index k from the `count` clamped ones, and rebuild the factor behind it; return the new count."""
     clamped = index[:n]
     place = index[n + k]
     index[n + k] = -1
@@ -56,7 +57,7 @@ def release_index(floats, index, n, count, k):
 
 @kernel
 def solve_clamped(factor, count, x):
-    """Overwrite the first `count` entries of x with the solution of L Lᵀ y = x."""
+    """Solve L Lᵀ y = x with the first `count` rows of a Cholesky factor L; y overwrites x."""
     for r in range(count):
         for t in range(r):
             x[r] -= factor[r, t] * x[t]

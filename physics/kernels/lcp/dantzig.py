@@ -1,4 +1,4 @@
-"""Principal pivoting for the complementarity problem of frictionless contact.
+"""Dantzig's method: principal pivoting for the complementarity problem of contacts without friction.
 
 For a symmetric positive semidefinite M and any q find z with
 
@@ -48,22 +48,26 @@ from physics.kernels.lcp.scaling_and_certificate import (
 )
 
 # Dimensionless: the scaled diagonal is in [1/4, 1), the scaled q at most 1. Rounding is 2^-53.
-DIRECTION_TOLERANCE = 2.0**-44  # of the largest rate: what moves slower stands still
-_TIE_TOLERANCE = 2.0**-42  # of 1 + max z: a driven w above minus this has reached zero
-SIGN_TOLERANCE = 2.0**-40  # of 1 + max z: a w above minus this counts as >= 0
+DIRECTION_TOLERANCE = 2.0**-44  # times the largest rate: a smaller rate counts as zero
+_TIE_TOLERANCE = 2.0**-42  # times 1 + max z: a driven w above minus this has reached zero
+SIGN_TOLERANCE = 2.0**-40  # times 1 + max z: a w above minus this counts as >= 0
 
-# Rows of `floats` after the factor (n rows) and the scaled matrix (n rows).
+# Rows of `floats` after the factor (n rows) and the scaled matrix (n rows): scales, right-hand side q, w, rates of z
+# and w in the present drive, and scratch.
 SCALE, RHS, W, RATE_Z, RATE_W, SCRATCH = range(6)
 
 
 def dantzig_sizes(n: int) -> tuple[tuple[int, int], int]:
-    """Shape of `floats` (float64) and length of `index` (int64) for a problem of size n."""
+    """Shape of the array `floats` (float64) and length of `index` (int64) of `dantzig` for a problem of size n."""
     return (2 * n + 6, n), 2 * n
 
 
 @kernel
 def scale_problem(M, q, floats):
-    """Write scaled matrix and q into `floats`; return the scales of M (0 if its diagonal is not >= 0) and q."""
+    """Scale M and q by powers of two, and write them into `floats`; return the factors of M and of q.
+
+    The factor of M is 0 if a diagonal entry is negative.
+    """
     n = q.shape[0]
     A, scale, rhs = floats[n : 2 * n], floats[2 * n + SCALE], floats[2 * n + RHS]
     largest = 0.0
@@ -88,9 +92,10 @@ def scale_problem(M, q, floats):
 
 @kernel
 def find_rates(floats, index, n, count, i):
-    """Rates of z and w while z_i grows at rate 1 and the clamped w stay zero.
+    """Compute the rates of z and w in the drive of index i: z_i grows at rate 1, and clamped w stay zero.
 
-    Returns (largest rate, whether i is independent of the clamped ones).
+    They are written to the rows RATE_Z and RATE_W of `floats`. Returns (largest rate, whether i is independent of the
+    clamped indices).
     """
     factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
     rate_z, rate_w, x = floats[2 * n + RATE_Z], floats[2 * n + RATE_W], floats[2 * n + SCRATCH]
@@ -112,10 +117,11 @@ def find_rates(floats, index, n, count, i):
 
 @kernel
 def find_block(floats, index, z, n, i, largest, is_independent):
-    """First index to reach zero in the drive of i, and the step. Index -1: nothing blocks.
+    """Find the index that blocks the drive of i, the growth of z_i until w_i = 0: (index, step of z_i).
 
-    If w_i is zero within rounding as well, i comes first, which ends the drive. Otherwise i would depend on the clamped
-    indices, and rounding would decide the next pivot.
+    It is the first index whose z or w reaches zero.
+    The index is -1 if nothing blocks. If w_i also reaches zero there, within rounding, i itself is returned, which ends
+    the drive. Otherwise i would depend on the clamped indices, and rounding would decide the next pivot.
     """
     w, rate_z, rate_w = floats[2 * n + W], floats[2 * n + RATE_Z], floats[2 * n + RATE_W]
     threshold = DIRECTION_TOLERANCE * largest
@@ -129,7 +135,7 @@ def find_block(floats, index, z, n, i, largest, is_independent):
             value, rate = z[k], rate_z[k]
         else:
             value, rate = w[k], rate_w[k]
-        # -2: found dependent in this drive. Negative w are not in order yet and block nothing.
+        # -2: found dependent in this drive. An index with a negative w is not in order yet, and does not block.
         if k == i or index[n + k] == -2 or rate >= -threshold or value < 0.0:
             continue
         if value < -step * rate:
@@ -146,7 +152,10 @@ def find_block(floats, index, z, n, i, largest, is_independent):
 
 @kernel
 def drive_to_zero(floats, index, z, n, count, i, budget):
-    """Increase z_i until w_i = 0. Returns (status, pivots, new clamped count)."""
+    """Drive index i: increase z_i until w_i = 0, by at most `budget` pivots. Returns (status, pivots, clamped count).
+
+    z and w of all indices and the clamped set are updated. `count` is the number of clamped indices before.
+    """
     w, rate_z, rate_w = floats[2 * n + W], floats[2 * n + RATE_Z], floats[2 * n + RATE_W]
     for pivots in range(budget):
         largest, is_independent = find_rates(floats, index, n, count, i)
@@ -155,7 +164,7 @@ def drive_to_zero(floats, index, z, n, count, i, budget):
             return LCP_RAY, pivots, count
         z[i] += step
         for k in range(n):
-            # what is in order stays so: rounding must not carry a tied index below zero
+            # an index that is in order stays so: rounding must not carry its z or w below zero
             if index[n + k] >= 0:
                 z[k] = max(z[k] + step * rate_z[k], 0.0)
             elif w[k] >= 0.0:
@@ -179,7 +188,10 @@ def drive_to_zero(floats, index, z, n, count, i, budget):
 
 @kernel
 def recompute(floats, index, z, n, count):
-    """Recompute z of the clamped indices from the factor, refined once, others 0; and w = M z + q."""
+    """Compute z and w = M z + q anew from the clamped set, so that errors do not add up.
+
+    z of the clamped indices is solved with the factor, and refined once; other z are 0.
+    """
     factor, A, clamped = floats[:n], floats[n : 2 * n], index[:n]
     rhs, w, x = floats[2 * n + RHS], floats[2 * n + W], floats[2 * n + SCRATCH]
     for k in range(n):
@@ -209,7 +221,7 @@ def recompute(floats, index, z, n, count):
 
 @kernel
 def drive_all(floats, index, z, n, max_pivots):
-    """Drive the first index with w < 0 until none is left. Returns (status, pivots)."""
+    """Drive one index with w < 0 after the other, the first one each time, until none is left: (status, pivots)."""
     count = 0
     pivots = 0
     while True:
@@ -245,7 +257,7 @@ def dantzig(M, q, z, floats, index, max_pivots):
     index : (2 n,) int64, scratch
         Clamped indices in the order of the factor, place of each index there or -1.
     max_pivots : int
-        Changes of the clamped set to do at most.
+        Largest number of changes of the clamped set.
 
     Returns
     -------
@@ -253,7 +265,7 @@ def dantzig(M, q, z, floats, index, max_pivots):
         0 solved, 1 ray (no z >= 0 has M z + q >= 0), 2 pivot limit, 3 data not
         finite or a negative diagonal, 4 solved but inaccurate.
     pivots : int
-        Changes of the clamped set done; 0 if q >= 0, where z = 0 is the solution.
+        Changes of the clamped set made; 0 if q >= 0, where z = 0 is the solution.
 
     Notes
     -----

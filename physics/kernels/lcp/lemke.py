@@ -48,21 +48,22 @@ from physics.kernels.lcp.scaling_and_certificate import (
 )
 
 # Dimensionless: entries of the scaled data are at most 1. Rounding is 2^-53.
-PIVOT_TOLERANCE = 2.0**-36  # of its column's largest entry: a smaller pivot is taken for rounded-off zero
-_TIE_TOLERANCE = 2.0**-36  # of its column's largest entry: closer rows of the ratio test count as tied
-REFINEMENTS = 2  # each gains the digits the tableau's inverse still has
+PIVOT_TOLERANCE = 2.0**-36  # share of its column's largest entry; a smaller pivot counts as zero
+_TIE_TOLERANCE = 2.0**-36  # share of its column's largest entry; closer rows of the ratio test count as tied
+REFINEMENTS = 2  # steps of iterative refinement of the solution
 
 
 def lemke_sizes(n: int) -> tuple[tuple[int, int], int]:
-    """Shape of `tableau` (float64) and length of `basis` (int64) for a problem of size n."""
+    """Shape of the array `tableau` (float64) and length of `basis` (int64) of `lemke` for a problem of size n."""
     return (n + 3, n + 2), 5 * n + 2
 
 
 @kernel
 def equilibrate(M, q, row_scale, column_scale):
-    """Powers of two that bring rows, then columns of M to a largest entry in [1/2, 1].
+    """Compute powers of two that scale the rows, then the columns of M, to a largest entry in [1/2, 1].
 
-    Returns the power of two that does the same for the row-scaled q.
+    They are written to `row_scale` and `column_scale`. Returns the power of two that does the same for the row-scaled
+    q.
     """
     n = q.shape[0]
     largest_q = 0.0
@@ -82,7 +83,10 @@ def equilibrate(M, q, row_scale, column_scale):
 
 @kernel
 def fill_tableau(M, q, tableau, basis):
-    """Fill the tableau of the start: w basic, z and z0 nonbasic, rows w - M z - z0 = q. Returns the scale of q."""
+    """Fill `tableau` and `basis` for the start: w basic, z and z0 nonbasic, rows w - M z - z0 = q, all scaled.
+
+    Returns the factor by which q was scaled.
+    """
     n = q.shape[0]
     row_scale, column_scale = tableau[n], tableau[n + 1]
     q_scale = equilibrate(M, q, row_scale, column_scale)
@@ -102,7 +106,7 @@ def fill_tableau(M, q, tableau, basis):
 
 @kernel
 def pivot_tableau(tableau, basis, n, r, c):
-    """Swap the basic variable of row r and the nonbasic one of column c."""
+    """Make a pivot in `tableau`: exchange the basic variable of row r and the nonbasic variable of column c."""
     pivot = tableau[r, c]
     for j in range(n + 2):
         tableau[r, j] /= pivot
@@ -121,7 +125,7 @@ def pivot_tableau(tableau, basis, n, r, c):
 
 @kernel
 def inverse_entry(tableau, basis, n, i, k):
-    """Entry (i, k) of the basis inverse: the column of w_k."""
+    """Entry (i, k) of the basis inverse, read from the column of w_k in `tableau`."""
     place = basis[2 * n + 1 + k]
     if place < 0:
         return tableau[i, -1 - place]
@@ -132,9 +136,10 @@ def inverse_entry(tableau, basis, n, i, k):
 
 @kernel
 def filter_tied_rows(tableau, basis, n, c, k, count):
-    """Keep those of the first `count` tied rows with the least ratio in column k of [q | inverse].
+    """Filter the first `count` tied rows by the ratio test for column c: keep those with the least ratio.
 
-    k = -1 stands for the right-hand side. Returns how many are left.
+    The numerator of the ratio is the entry in column k of the basis inverse, or in the right-hand side if k = -1.
+    Returns the number of rows that are kept, which are first in the list of tied rows in `basis`.
     """
     tied = basis[4 * n + 2 :]
     largest = 0.0
@@ -158,9 +163,9 @@ def filter_tied_rows(tableau, basis, n, c, k, count):
 
 @kernel
 def find_leaving_row(tableau, basis, n, c):
-    """Lexicographic minimum ratio test in column c: the row that blocks first, -1 for a ray.
+    """Find the row whose variable leaves the basis, by the lexicographic ratio test in column c; -1 for a ray.
 
-    Among rows that block together z0 goes first, because that ends the path.
+    If z0 is in one of the rows that are tied, it leaves, since this ends the path.
     """
     tied = basis[4 * n + 2 :]
     largest = 0.0
@@ -186,7 +191,10 @@ def find_leaving_row(tableau, basis, n, c):
 
 @kernel
 def find_first_row(tableau, n):
-    """Row in which z0 enters: least q; of tied rows the last, which is lexicographically least."""
+    """Find the row in which z0 enters the basis: that with the least q; of tied rows the last.
+
+    The last one is lexicographically least.
+    """
     r = 0
     for i in range(1, n):
         if tableau[i, n + 1] <= tableau[r, n + 1]:
@@ -196,7 +204,7 @@ def find_first_row(tableau, n):
 
 @kernel
 def refine_solution(M, q, z, tableau, basis, q_scale):
-    """Take two steps of iterative refinement of the basic solution, then return z in scaled units."""
+    """Improve the basic solution in `tableau` by two steps of iterative refinement; write it to z, in scaled units."""
     n = q.shape[0]
     row_scale, column_scale, defect = tableau[n], tableau[n + 1], tableau[n + 2]
     for sweep in range(REFINEMENTS + 1):
@@ -218,7 +226,7 @@ def refine_solution(M, q, z, tableau, basis, q_scale):
 
 @kernel
 def follow_lemke_path(tableau, basis, n, max_pivots):
-    """Pivot until z0 has left the basis. Returns (status, pivots)."""
+    """Pivot along Lemke's path until z0 has left the basis, at most `max_pivots` times: (status, pivots)."""
     r = find_first_row(tableau, n)
     if max_pivots < 1:
         return LCP_PIVOT_LIMIT, 0
@@ -259,14 +267,14 @@ def lemke(M, q, z, tableau, basis, max_pivots):
         each variable (2 n + 1: row, or -1 - column), tied rows (n). Variables
         are numbered w_0 .. w_{n-1}, z_0 .. z_{n-1}, z0.
     max_pivots : int
-        Exchanges to do at most. A few n suffice in practice; the worst case is 2^n.
+        Largest number of pivots. A few n suffice in practice; the worst case is 2^n.
 
     Returns
     -------
     status : int
         0 solved, 1 ray, 2 pivot limit, 3 data not finite, 4 solved but inaccurate.
     pivots : int
-        Exchanges done; 0 if q >= 0, where z = 0 is the solution.
+        Pivots made; 0 if q >= 0, where z = 0 is the solution.
 
     Notes
     -----

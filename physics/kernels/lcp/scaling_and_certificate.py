@@ -1,7 +1,7 @@
 """Statuses, exact scaling and final check, shared by the solvers of linear complementarity problems.
 
-Every solver scales its problem by powers of two first. That is exact in floating
-point, makes tolerances dimensionless, and lets units of any size stand side by side.
+Every solver scales its problem by powers of two first. This is exact in floating
+point, makes tolerances dimensionless, and allows units of any size.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from physics.compiler.decorators import kernel
 LCP_SOLVED = 0
 LCP_RAY = 1  # the path ended without a solution
 LCP_PIVOT_LIMIT = 2
-LCP_BAD_DATA = 3  # not finite, or not of the class that the solver asks for
+LCP_BAD_DATA = 3  # data not finite, or not of the class that the solver needs
 LCP_INACCURATE = 4  # the path ended in a solution, but rounding left too large a residual
 
-RESIDUAL_TOLERANCE = 2.0**-30  # of the largest sum of magnitudes in a row of M z + q
+RESIDUAL_TOLERANCE = 2.0**-30  # share of the largest sum of magnitudes in a row of M z + q
 
 
 @kernel
 def inverse_power_of_two(x):
-    """2^-e for |x| = m 2^e with m in [1/2, 1); 1 for x = 0."""
+    """Power of two that scales |x| to [1/2, 1): 2^-e for |x| = m 2^e; 1 for x = 0."""
     if x == 0.0:
         return 1.0
     return math.ldexp(1.0, -math.frexp(x)[1])
@@ -43,7 +43,11 @@ def are_finite(M, q):
 
 @kernel
 def certify_solution(M, q, z, row_scale, column_scale, q_scale):
-    """`LCP_SOLVED` if the natural residual max |min(z, w)| of the scaled problem is small, else `LCP_INACCURATE`."""
+    """Check a solution z of w = M z + q, w >= 0, z >= 0, z·w = 0: LCP_SOLVED or LCP_INACCURATE.
+
+    It is solved if the natural residual max |min(z, w)| of the scaled problem is small. `row_scale`, `column_scale` and
+    `q_scale` are the factors of rows, columns and q in the scaled problem; z is in its units.
+    """
     n = q.shape[0]
     worst = 0.0
     largest = 0.0

@@ -1,1 +1,1 @@
-"""Quaternions, roots, small dense systems."""
+"""Mathematics of the kernels: vectors, quaternions, roots of parabolas, small linear systems, disjoint sets."""

@@ -1,4 +1,4 @@
-"""A small dense system that may be singular: Gauss's elimination with full pivoting, and solutions of least norm."""
+"""Solve small dense linear systems that may be singular: Gauss's elimination with full pivoting, and least norms."""
 
 from __future__ import annotations
 
@@ -6,28 +6,32 @@ import math
 
 from physics.compiler.decorators import kernel
 
-# A pivot below this share of the largest one is none: the rows left then say the same twice.
+# A pivot below this share of the largest one counts as zero: the rows left then depend linearly on those before.
 PIVOT_SHARE = 1.0e-10
 
 
 @kernel
 def solve_full_pivot(m, A, order, x):
-    """Solve the m equations A[:, :m] x = A[:, m], A is overwritten; unknowns without a pivot are 0.
+    """Solve m equations A x = b for x, by Gauss's elimination with full pivoting; A may be singular.
+
+    An unknown whose column has no pivot is 0. Elimination stops at the first pivot below `PIVOT_SHARE` of the largest.
 
     Parameters
     ----------
     m : int
+        Number of equations and of unknowns.
     A : (>= m, >= m + 1) float64, overwritten
-        Right-hand side in column m.
+        Matrix in columns 0 to m - 1, right-hand side b in column m.
     order : (>= m,) int64, out
-        Column of each pivot.
+        Column of each pivot, in the order of elimination.
     x : (>= m,) float64, out
 
     Returns
     -------
     rank : int
+        Number of pivots.
     least : float
-        The least pivot, one that was none included, as a share of the largest.
+        Size of the last candidate for a pivot, relative to the largest one; below `PIVOT_SHARE` if A is singular.
     """
     for k in range(m):
         order[k] = k
@@ -66,16 +70,17 @@ def solve_full_pivot(m, A, order, x):
 
 @kernel
 def solve_least_norm(rows, m, A, x):
-    """Solution x of least norm of A[:rows, :m] x = A[:rows, m]; A is overwritten, dependent rows are left out.
+    """Solve `rows` equations A x = b in m unknowns for the solution x of least norm; dependent rows are left out.
 
-    Rows are made orthonormal one after the other (modified Gram-Schmidt). So x, a sum of rows, is smooth in A while the
-    rank stays the same. In an elimination rounding would choose the zero unknowns where pivots are equal.
+    Rows are made orthonormal one after the other (modified Gram-Schmidt). So x, a weighted sum of these rows, is smooth
+    in A while the rank stays the same. Elimination is not: where pivots are equal, rounding chooses the unknowns that
+    become zero.
 
     Parameters
     ----------
     rows, m : int
     A : (>= rows, >= m + 1) float64, overwritten
-        Right-hand side in column m.
+        Matrix in columns 0 to m - 1, right-hand side b in column m.
     x : (>= m,) float64, out
     """
     largest = 0.0

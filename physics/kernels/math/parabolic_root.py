@@ -1,4 +1,4 @@
-"""Root of a gap, by the parabola through its known values."""
+"""Find the time at which a gap closes, by the parabola through its known values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from physics.compiler.decorators import inlined
 
 @inlined
 def second_difference(a, fa, b, fb, c, fc):
-    """Second divided difference of three values: half of a parabola's second derivative; 0 of equal places."""
+    """Second divided difference of the values fa, fb, fc at a < b < c; 0 unless a < b < c.
+
+    It is half of the second derivative of the parabola through the three points.
+    """
     if not (a < b < c):
         return 0.0
     return ((fc - fb) / (c - b) - (fb - fa) / (b - a)) / (c - a)
@@ -17,10 +20,11 @@ def second_difference(a, fa, b, fb, c, fc):
 
 @inlined
 def parabola_crossing_time(low_gap, high_gap, width, bend):
-    """Root in [0, width] of the parabola from low_gap >= 0 to high_gap < 0, `width` later.
+    """Root x in [0, width] of a parabola that is low_gap >= 0 at x = 0 and high_gap < 0 at x = width.
 
-    With the slope B at its start and `bend` c, c x² + B x + low_gap = 0: of the root's two forms the one that does not
-    cancel. A gap that grows at first (B > 0) comes down again: c < 0.
+    `bend` is half of the parabola's second derivative, as `second_difference` gives it. With the slope B at x = 0 the
+    equation is bend x² + B x + low_gap = 0. Of the two formulas for its root the one without cancellation is used.
+    Where the gap grows at first (B > 0), bend < 0, since it is negative at the end.
     """
     if not low_gap > 0.0:
         return 0.0

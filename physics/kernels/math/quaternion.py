@@ -17,7 +17,7 @@ from physics.compiler.decorators import inlined
 
 @inlined
 def multiply(a, b):
-    """Hamilton product ab: first rotate by b, then by a."""
+    """Hamilton product ab of two quaternions: the rotation by b, followed by the rotation by a."""
     return (
         a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
         a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
@@ -28,22 +28,23 @@ def multiply(a, b):
 
 @inlined
 def conjugate(q):
-    """The inverse rotation of a unit quaternion."""
+    """Conjugate of a unit quaternion: the inverse rotation."""
     return (q[0], -q[1], -q[2], -q[3])
 
 
 @inlined
 def normalise(q):
-    """q / |q|."""
+    """Scale a quaternion to unit length: q / |q|."""
     s = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return (q[0] * s, q[1] * s, q[2] * s, q[3] * s)
 
 
 @inlined
 def renormalise(q):
-    """q / |q| for a quaternion whose length is 1 up to rounding.
+    """Scale a quaternion, whose length is 1 up to rounding, to unit length: q / |q| without a square root.
 
-    One Newton step for 1/√x from 1: its error, 3/8 (x - 1)², vanishes below rounding for |x - 1| < 1e-8.
+    With x = |q|², 1/√x is found by one Newton step from 1. Its error, 3/8 (x - 1)², is below rounding for
+    |x - 1| < 1e-8.
     """
     s = 1.5 - 0.5 * ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
     return (q[0] * s, q[1] * s, q[2] * s, q[3] * s)
@@ -66,7 +67,7 @@ def to_matrix(q):
 
 @inlined
 def matvec(R, a):
-    """R a for a matrix of nine scalars: body to world."""
+    """Product R a of a matrix, nine scalars row by row, and a vector; of a rotation matrix: body to world."""
     return (
         R[0] * a[0] + R[1] * a[1] + R[2] * a[2],
         R[3] * a[0] + R[4] * a[1] + R[5] * a[2],
@@ -76,7 +77,7 @@ def matvec(R, a):
 
 @inlined
 def transposed_matvec(R, a):
-    """Rᵀ a for a matrix of nine scalars: world to body."""
+    """Product Rᵀ a of a transposed matrix, R as nine scalars row by row; of a rotation matrix: world to body."""
     return (
         R[0] * a[0] + R[3] * a[1] + R[6] * a[2],
         R[1] * a[0] + R[4] * a[1] + R[7] * a[2],
@@ -86,7 +87,7 @@ def transposed_matvec(R, a):
 
 @inlined
 def symmetric_matvec(A, a):
-    """A a for a symmetric matrix, its upper triangle row by row."""
+    """Product A a of a symmetric 3 x 3 matrix and a vector; A is its upper triangle, six scalars row by row."""
     return (
         A[0] * a[0] + A[1] * a[1] + A[2] * a[2],
         A[1] * a[0] + A[3] * a[1] + A[4] * a[2],
@@ -96,25 +97,25 @@ def symmetric_matvec(A, a):
 
 @inlined
 def cross(a, b):
-    """a x b."""
+    """Cross product a x b of two vectors."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @inlined
 def dot(a, b):
-    """a · b."""
+    """Dot product a · b of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined
 def rotate(q, a):
-    """Body vector a in the world frame."""
+    """Turn the body vector a into a world vector, by the attitude q of the body."""
     return matvec(to_matrix(q), a)
 
 
 @inlined
 def exp_map(rotation):
-    """Quaternion of the rotation vector `free_rotation` [rad], exp(rotation / 2).
+    """Quaternion exp(rotation / 2) of a rotation vector: its direction is the axis, its length the angle [rad].
 
     sin(x)/x is taken from its series where the quotient would lose digits:
     at x = 1e-4 the first neglected term x⁴/120 is 8e-19, below rounding.
@@ -131,5 +132,5 @@ def exp_map(rotation):
 
 @inlined
 def lerp(a, b, s):
-    """a + s (b - a) of vectors."""
+    """Interpolate linearly between the vectors a and b: a + s (b - a)."""
     return (a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1]), a[2] + s * (b[2] - a[2]))

@@ -1,5 +1,8 @@
 """Disjoint sets, joined pair by pair: union-find with path halving.
 
+The array `parent` links each member to another member of its set, or to itself; a member linked to itself is the root,
+which stands for the set.
+
 Reference: R. E. Tarjan, *Efficiency of a good but not linear set union algorithm*, J. ACM 22, 1975.
 """
 
@@ -10,7 +13,7 @@ from physics.compiler.decorators import inlined
 
 @inlined
 def find_root(b, parent):
-    """First body of the island of b."""
+    """Find the root of the set that holds b, and shorten the links on the way; it is the set's lowest index."""
     while parent[b] != b:
         parent[b] = parent[parent[b]]
         b = parent[b]
@@ -19,6 +22,6 @@ def find_root(b, parent):
 
 @inlined
 def unite_sets(a, b, parent):
-    """Join the islands of a and b."""
+    """Join the set that holds a and the set that holds b."""
     a, b = find_root(a, parent), find_root(b, parent)
     parent[max(a, b)] = min(a, b)

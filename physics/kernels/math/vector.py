@@ -7,29 +7,29 @@ from physics.compiler.decorators import inlined
 
 @inlined
 def as_vector(a):
-    """Three numbers of an array (3,) or a tuple."""
+    """Tuple of the first three numbers of an array or a tuple."""
     return (a[0], a[1], a[2])
 
 
 @inlined
 def row_vector(rows, i, first):
-    """Three numbers of row i of an array (n, m) from column `first`."""
+    """Tuple of three numbers of row i of an array (n, m): columns `first` to `first` + 2."""
     return (rows[i, first], rows[i, first + 1], rows[i, first + 2])
 
 
 @inlined
 def plus(a, b):
-    """Return a + b."""
+    """Sum a + b of two vectors."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @inlined
 def minus(a, b):
-    """Return a - b."""
+    """Difference a - b of two vectors."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @inlined
 def times(s, a):
-    """Return s a, of a number s and a vector a."""
+    """Product s a of a number s and a vector a."""
     return (s * a[0], s * a[1], s * a[2])

@@ -1,1 +1,1 @@
-"""Threads that share work without Python's lock: atomics, work stealing, spinning workers."""
+"""Threads that share worlds in machine code, without Python's lock: atomics, work stealing, spinning workers."""

@@ -1,6 +1,7 @@
-"""Atomic changes and reads of an array that threads share without a lock.
+"""Add atomically to an array that threads share without a lock.
 
-Where the compiler has none, each thread has a table of its own (`physics.parallel.thread_pool`).
+Compilers without atomic operations use a plain addition; then each thread has a table of its own
+(`physics.parallel.thread_pool`).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from physics.compiler.decorators import backend, inlined
 
 @inlined
 def _add(table, row, column, number):
-    """table[row, column] += number; returns what was there before."""
+    """Add `number` to table[row, column], not atomically; return the value before the addition."""
     before = table[row, column]
     table[row, column] = before + number
     return before

@@ -1,18 +1,22 @@
-"""Threads that wait for each other in machine code.
+"""Worker threads that wait for their leader in machine code, by a spin wait.
 
-A member of a crew makes the calls that it was given (`prepared_calls`), says that it has finished, and waits for a
-while to be called again. To be woken takes a thread half as long as a batch of a hundred worlds, and to get hold of the
-interpreter, without which it can neither begin nor end, as long as another one keeps it.
+The leader is the thread that steps a batch; the workers help it. The leader gives each worker prepared calls
+(`prepared_calls`) and wakes it. The worker makes the calls, and then spins for a while, ready for the next batch. A
+thread that sleeps instead would need half the time of a batch of a hundred worlds to wake up. It would also have to
+wait for Python's interpreter lock, without which it can neither begin nor end.
 
-A member is AWAY or WAITING until the leader has CALLED it, BUSY from when it begins, and WAITING again when it has
-finished. A member that is dismissed while it is busy is LEAVING, and then AWAY. The leader takes the call back from
-a member that has not begun when there is nothing left to do: its processor may be busy with another program.
-Whoever changes a state does so from the state it has to be in, in one atomic operation, since the other one may have
-changed it in the meantime.
+A worker's state is in the table `crew`, which all threads share:
 
-A thread that waits gives way from time to time: a program that has to share its processor runs instead, and so does
-the thread that it waits for. A member that finds itself on the leader's processor does not begin, and gives way at
-once.
+- IDLE: the worker's thread does not run its loop. SPINNING: it waits for calls.
+- WOKEN: the leader wants it to make its calls. RUNNING: it makes them; SPINNING follows.
+- STOPPING: it was told to stop while it was running; IDLE follows.
+
+When nothing is left to do, the leader sets workers that are still WOKEN back to SPINNING: their processors may be busy
+with another program. Both sides change a state by an atomic compare-and-exchange, since the other side may have changed
+it in the meantime.
+
+A waiting thread yields its processor from time to time, so that other programs run, or the thread that it waits for. A
+worker that finds itself on the leader's processor does not begin, and yields at once.
 """
 
 from __future__ import annotations
@@ -33,10 +37,10 @@ from physics.kernels.parallel.work_stealing import PADDING_WORDS, TAKEN_COUNT, r
 
 IDLE, SPINNING, WOKEN, RUNNING, STOPPING = range(5)
 
-# Of a crew: how many members' calls raised an exception, the leader's processor, and whether it has done its
-# part; the addresses of the functions that give way and that tell the processor (0: none); and the number of pauses
-# between two calls of the first one, and before the first call of a member that waits while the leader is busy. Then, a
-# row for each member: its state, its jobs and their number, and whether it was away when it was called.
+# Columns of row 0 of `crew`: number of threads whose calls raised an exception; the leader's processor; 1 once the
+# leader has made its own calls; the addresses of the functions that yield and that tell the processor (0: none); the
+# pauses between two yields; and the pauses before the first yield of a thread that waits while the leader is busy.
+# Columns of row k, of worker k: its state, the address and the number of its jobs, and 1 if it was IDLE when woken.
 (
     CREW_FAILED_COUNT,
     CREW_LEADER_PROCESSOR,
@@ -48,18 +52,22 @@ IDLE, SPINNING, WOKEN, RUNNING, STOPPING = range(5)
 ) = range(7)
 WORKER_STATE, WORKER_JOBS, WORKER_JOB_COUNT, WORKER_WAS_IDLE = range(4)
 
-# What became of a run: all went well, someone has not finished, a call raised an exception.
+# Outcomes of `run_and_join`: all calls were made, some worker has not finished, a call raised an exception.
 RUN_DONE, RUN_UNFINISHED, RUN_FAILED = range(3)
 
 
 def make_worker_table(members: int) -> np.ndarray:
-    """Table (1 + members, PADDING_WORDS) int64 with all members away."""
+    """Make the table `crew` (1 + members, PADDING_WORDS) int64 of so many workers, all of them IDLE."""
     return np.zeros((1 + members, PADDING_WORDS), dtype=np.int64)
 
 
 @kernel
 def wake_workers(crew, turns, members):
-    """Call the first members to a new batch; return the number of those that are away and must be sent for."""
+    """Wake the first `members` workers for a new batch, and reset the ranges of worlds in `turns`.
+
+    `crew` is the table of `make_worker_table`. Returns the number of workers that were IDLE, not in their loop; the
+    caller must start their threads.
+    """
     reset_ranges(turns)
     crew[0, CREW_FAILED_COUNT] = crew[0, CREW_LEADER_DONE] = away = 0
     crew[0, CREW_LEADER_PROCESSOR] = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
@@ -71,7 +79,7 @@ def wake_workers(crew, turns, members):
 
 @kernel
 def stop_workers(crew):
-    """Dismiss all members, each at once or after its present call."""
+    """Stop all workers: those that wait become IDLE at once, those that run become IDLE after their present calls."""
     for k in range(1, crew.shape[0]):
         while SPINNING <= atomic_load(crew, k, WORKER_STATE) <= RUNNING:
             compare_exchange(crew, k, WORKER_STATE, WOKEN, IDLE)
@@ -81,7 +89,7 @@ def stop_workers(crew):
 
 @inlined
 def _rest(crew, look):
-    """Pause after so many polls; the leader may need this processor itself."""
+    """Pause a waiting thread after its poll number `look`; after some polls it also yields its processor to others."""
     spin_pause()
     if look % crew[0, CREW_YIELD_INTERVAL] == 0 or (
         look == crew[0, CREW_BRIEF_PAUSES] and atomic_load(crew, 0, CREW_LEADER_DONE) == 0
@@ -91,7 +99,7 @@ def _rest(crew, look):
 
 @inlined
 def _is_busy(crew, member, patience):
-    """True if the member has not finished after so many polls."""
+    """True if a worker is still RUNNING after `patience` polls of its state."""
     for look in range(1, patience + 1):
         if atomic_load(crew, member, WORKER_STATE) != RUNNING:
             return False
@@ -101,7 +109,11 @@ def _is_busy(crew, member, patience):
 
 @kernel
 def run_and_join(crew, taken, members, jobs, count, patience):
-    """Make calls, and wait until all members that began have finished or `patience` is over; return the outcome."""
+    """Make the leader's `count` calls, then wait for the workers that have begun; return RUN_DONE or another RUN code.
+
+    Each of the first `members` workers is polled at most `patience` times. A worker that has not begun is not waited
+    for, and its list of worlds in `taken` is emptied.
+    """
     if run_jobs(jobs, count):
         atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
     atomic_exchange(crew, 0, CREW_LEADER_DONE, 1)
@@ -116,7 +128,7 @@ def run_and_join(crew, taken, members, jobs, count, patience):
 
 @inlined
 def _is_in_the_way(crew):
-    """True if a member runs on the leader's processor and would only delay it; the member has then yielded."""
+    """True if the calling worker runs on the leader's processor, where it would delay the leader; it then yields."""
     processor = call_address(crew[0, CREW_PROCESSOR_ADDRESS])
     if processor < 0 or processor != crew[0, CREW_LEADER_PROCESSOR]:
         return False
@@ -126,7 +138,7 @@ def _is_in_the_way(crew):
 
 @inlined
 def _begins(crew, member, patience):
-    """True if the waiting member is called within so many polls; else it is away."""
+    """Wait until a worker is woken, for `patience` polls at most: True if it is RUNNING now, False if it is IDLE."""
     for look in range(1, patience + 1):
         state = atomic_load(crew, member, WORKER_STATE)
         if state == WOKEN and not _is_in_the_way(crew) and compare_exchange(crew, member, WORKER_STATE, WOKEN, RUNNING):
@@ -146,7 +158,10 @@ def _begins(crew, member, patience):
 
 @kernel
 def worker_loop(crew, member, patience):
-    """Run a member: make its calls each time it is called, and leave after a long wait."""
+    """Run the loop of worker number `member`: make its calls each time it is woken.
+
+    The loop ends after `patience` polls without a call, or when the worker is stopped.
+    """
     while _begins(crew, member, patience):
         if run_jobs(crew[member, WORKER_JOBS], crew[member, WORKER_JOB_COUNT]):
             atomic_add(crew, 0, CREW_FAILED_COUNT, 1)
@@ -157,6 +172,6 @@ def worker_loop(crew, member, patience):
 
 @kernel
 def repeat_pause(times):
-    """Make so many pauses, to measure the length of one."""
+    """Make `times` spin pauses, so that the caller can measure the length of one."""
     for _ in range(times):
         spin_pause()

@@ -1,8 +1,8 @@
-"""Work stealing over a batch: each thread takes the next few worlds of its own range, then of the others' ranges.
+"""Work stealing over a batch: each thread takes the next few worlds of its own range, then of other threads' ranges.
 
-They do so in machine code, without the interpreter in between: its lock changes hands only when a thread begins and
-ends. A thread finds the worlds of its own range in the cache of its processor, where it left them after the last step.
-With one queue for all, half of the worlds of a thread had been stepped by the other one, and came from its cache.
+Threads do so in machine code, and need Python's interpreter lock only to begin and to end. A thread finds the worlds of
+its own range in its processor's cache, where the last step left them. A single queue for all threads would be slower,
+since a thread would often take worlds from another processor's cache.
 """
 
 from __future__ import annotations
@@ -12,21 +12,24 @@ import numpy as np
 from physics.compiler.decorators import inlined, kernel, lend
 from physics.kernels.parallel.atomics import atomic_add
 
-# Words between what different threads change: two lines of a cache, since processors fetch them in pairs.
+# Words (8 bytes) between numbers that different threads change: two cache lines, since processors fetch pairs of lines.
 PADDING_WORDS = 16
 
-# `turns`, of all threads. Row 0: how many worlds are taken at once, and the first world. Then a row for each range: the
-# first of its worlds that nobody has taken, and the end of the range.
+# Columns of `turns`, which all threads share. Row 0: how many worlds are taken at once, and the first world. Row k, of
+# the range of thread k - 1: the first of its worlds that no thread has taken, and the end of the range.
 RANGE_CHUNK = 0
 RANGE_NEXT, RANGE_END = range(2)
 
-# `taken`, of one thread: how many worlds it has taken, the end of those it took last, the range that it takes from, its
-# own range, and from TAKEN_FIRST_WORLD on the worlds.
+# Columns of `taken`, of one thread: how many worlds it has taken, the end of the chunk that it took last, the row of
+# the range that it takes from, the row of its own range, and from TAKEN_FIRST_WORLD on the worlds.
 TAKEN_COUNT, TAKEN_CHUNK_END, TAKEN_RANGE, TAKEN_OWN_RANGE, TAKEN_FIRST_WORLD = range(5)
 
 
 def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
-    """Ranges (1 + threads, PADDING_WORDS) int64 of worlds, one for each thread."""
+    """Make the table `turns` (1 + threads, PADDING_WORDS) int64: equal ranges of so many worlds, one for each thread.
+
+    A thread takes `chunk` worlds at once. Call `reset_ranges` before worlds are taken; a single range needs no call.
+    """
     turns = np.zeros((1 + threads, PADDING_WORDS), dtype=np.int64)
     turns[0, RANGE_CHUNK] = chunk
     turns[1:, RANGE_END] = worlds * np.arange(1, threads + 1) // threads
@@ -34,7 +37,10 @@ def make_ranges(threads: int, worlds: int, chunk: int) -> np.ndarray:
 
 
 def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
-    """Lists (threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64 of taken worlds, one row per thread, empty."""
+    """Make empty lists of the worlds that each thread takes, one row `taken` per thread.
+
+    The shape is (threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS), int64.
+    """
     lists = np.zeros((threads, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS), dtype=np.int64)
     lists[:, TAKEN_OWN_RANGE] = 1 + np.arange(threads)
     return lists
@@ -42,7 +48,10 @@ def make_taken_lists(threads: int, worlds: int) -> np.ndarray:
 
 @inlined
 def begin_taking(turns, taken):
-    """Clear the taken worlds; return the index before the first world. A single thread also resets its range."""
+    """Clear a thread's list of taken worlds, and return -1, with which its first call of `next_world` begins.
+
+    If `turns` has a single range, its worlds become available again; several ranges need `reset_ranges`.
+    """
     if turns.shape[0] == 2:
         turns[1, RANGE_NEXT] = turns[0, RANGE_END]
     taken[TAKEN_COUNT] = taken[TAKEN_CHUNK_END] = 0
@@ -52,7 +61,10 @@ def begin_taking(turns, taken):
 
 @kernel
 def take_chunk(turns, taken):
-    """First of the thread's next worlds, which end at `taken[TAKEN_CHUNK_END]`, or -1."""
+    """Take the next chunk of worlds for a thread: return its first world, or -1 if no range has any left.
+
+    The end of the chunk is written to `taken[TAKEN_CHUNK_END]`.
+    """
     chunk = turns[0, RANGE_CHUNK]
     for _ in range(1, turns.shape[0]):
         place = taken[TAKEN_RANGE]
@@ -66,15 +78,16 @@ def take_chunk(turns, taken):
 
 @inlined
 def next_world(world, turns, taken):
-    """World that the thread steps after `world`, or -1.
+    """Next world that the thread steps, after `world`; -1 if no world is left.
 
     Parameters
     ----------
     world : int
+        World that the thread has just stepped, or -1 from `begin_taking`.
     turns : (1 + threads, PADDING_WORDS) int64, in and out
-        Of all threads: `make_ranges`.
+        Ranges of all threads: `make_ranges`.
     taken : (TAKEN_FIRST_WORLD + worlds + PADDING_WORDS,) int64, in and out
-        Of this thread.
+        Worlds that this thread has taken; the next world is added.
     """
     world += 1
     if world == taken[TAKEN_CHUNK_END]:
@@ -88,20 +101,21 @@ def next_world(world, turns, taken):
 
 @inlined
 def reset_ranges(turns):
-    """Reset all ranges, with no world taken."""
+    """Reset the ranges of all threads, so that all of their worlds can be taken."""
     for k in range(1, turns.shape[0]):
         turns[k, RANGE_NEXT] = turns[k - 1, RANGE_END] if k > 1 else 0
 
 
 def for_each_world(advance):
-    """Make the kernel (queue, about) with the one loop over worlds, which calls ``advance(world, *about)`` for each.
+    """Make a kernel (queue, about) that calls ``advance(world, *about)`` for each world that its thread takes.
 
-    A thread takes worlds that no other thread has taken (`WorkQueue` of `physics.kernels.state.groups`).
+    The thread takes worlds that no other thread has taken, from `queue`, a `WorkQueue` of
+    `physics.kernels.state.groups`.
 
     Parameters
     ----------
     advance : kernel
-        Advances one world; `about` is the tuple of its other arguments.
+        Advances one world; `about` is the tuple of its arguments after the world.
     """
 
     @inlined

@@ -1,1 +1,1 @@
-"""Memory layouts: state of a body, records of a step, and contact laws that a kernel is compiled for."""
+"""Memory layouts of the kernels: states and parameters of bodies, records of a step, sleep, and contact laws."""

@@ -1,4 +1,8 @@
-"""Record of one body for one step, prepared once and passed from stage to stage."""
+"""Read, write and check the state of a body, and fill the record of its parameters and loads for a step.
+
+A state is y = (x, q, v, L): position of the centre of mass [m], attitude as a unit quaternion, velocity [m/s] and
+angular momentum [kg m²/s], all in the world frame. `body` is the record of one body (`workspace.body_fields`).
+"""
 
 from __future__ import annotations
 
@@ -17,16 +21,17 @@ def _no_gravity(world, bodies):
 
 @if_given("bodies.gravity", _no_gravity)
 def _gravity_of(world, bodies):
-    """Gravity of a world [m/s²]."""
+    """Gravity of a world, world frame [m/s²]; zero where the scene has none."""
     return row_vector(bodies.gravity, world, 0)
 
 
 @inlined
 def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, body):
-    """Write parameters of body i, and the loads held over the step, into `body`.
+    """Write the parameters of the body in row i, and its loads by gravity and wrench, into the record `body`.
 
-    gravity, friction, restitution and offset_frame are None if the scene does not have them. offset_frame is None if
-    the principal axes of every body are its body axes, and its geometric centre is its centre of mass.
+    The switches friction, restitution and offset_frame are None if the scene does not have them, `bodies.gravity` as
+    well. offset_frame is None if the principal axes of every body are its body axes, and its geometric centre is its
+    centre of mass.
     """
     inv_mass, radius = bodies.params[i, at.INV_MASS], bodies.params[i, at.RADIUS]
     gravity = _gravity_of(world, bodies)
@@ -57,7 +62,7 @@ def bind_body(world, i, shape, bodies, friction, restitution, offset_frame, body
 
 @inlined
 def read_state(state, i):
-    """(x, q, v, L) of row i: position, attitude, velocity, angular momentum."""
+    """Read y = (x, q, v, L) from row i: position, attitude, velocity, angular momentum."""
     return (
         (state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2]),
         (state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3]),
@@ -68,7 +73,7 @@ def read_state(state, i):
 
 @inlined
 def write_state(state, i, y):
-    """Store y = (x, q, v, L) in row i."""
+    """Store y = (x, q, v, L) in row i; its angular velocity is not written."""
     x, q, v, L = y
     state[i, at.POS], state[i, at.POS + 1], state[i, at.POS + 2] = x
     state[i, at.QUAT], state[i, at.QUAT + 1], state[i, at.QUAT + 2], state[i, at.QUAT + 3] = q
@@ -78,7 +83,7 @@ def write_state(state, i, y):
 
 @inlined
 def is_finite(y):
-    """True if all numbers of the state are finite, and their squares far from overflow (`layout.OVERFLOW_LIMIT`)."""
+    """True if all numbers of the state y are finite and at most `layout.OVERFLOW_LIMIT`, far from overflow."""
     x, q, v, L = y
     turn = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
     return (qt.dot(x, x) + qt.dot(v, v)) + (qt.dot(L, L) + turn) <= at.OVERFLOW_LIMIT * at.OVERFLOW_LIMIT
@@ -92,7 +97,7 @@ def are_all_finite(now):
 
 @inlined
 def find_nonfinite_body(now):
-    """The first body in `now` (bodies, STATE_SIZE) whose state is not finite, -1: none."""
+    """Index of the first row of `now` (bodies, STATE_SIZE) whose state is not finite; -1 if there is none."""
     for b in range(now.shape[0]):
         if not is_finite(read_state(now, b)):
             return b
@@ -101,13 +106,13 @@ def find_nonfinite_body(now):
 
 @inlined
 def has_finite_loads(body):
-    """True if the loads found by `bind_body` are finite and far from overflow (`layout.OVERFLOW_LIMIT`)."""
+    """True if the acceleration that `bind_body` found for the body is at most `layout.OVERFLOW_LIMIT`, and finite."""
     return body.acceleration <= at.OVERFLOW_LIMIT
 
 
 @inlined
 def find_overloaded_body(bodies):
-    """Index of the first of the records `bodies` with loads too large to bear; -1 if there is none."""
+    """Index of the first of the records `bodies` without finite loads (`has_finite_loads`); -1 if there is none."""
     for b in range(bodies.shape[0]):
         if not has_finite_loads(bodies[b]):
             return b
@@ -116,14 +121,14 @@ def find_overloaded_body(bodies):
 
 @inlined
 def clear_report(world, report):
-    """Clear the report of a world at the start of its steps."""
+    """Set all numbers of a world's row of `report` (worlds, REPORT_SIZE) to zero, at the start of a call of a step."""
     for c in range(at.REPORT_SIZE):
         report[world, c] = 0.0
 
 
 @inlined
 def report_fault(world, b, report):
-    """Report a fault of body b of a world, which keeps its old state."""
+    """Count a fault of body b of a world in `report`: its loads or new state are not finite, its old state is kept."""
     report[world, at.FAULTS] += 1.0
     if report[world, at.FIRST_FAULTY] == 0.0:
         report[world, at.FIRST_FAULTY] = 1.0 + b
@@ -131,7 +136,10 @@ def report_fault(world, b, report):
 
 @inlined
 def principal_attitude(q, body, offset_frame):
-    """Quaternion of the principal frame, from that of the body frame (equal unless `offset_frame`)."""
+    """Quaternion from the principal frame to the world, from the quaternion q of the body frame.
+
+    The two are equal where the switch `offset_frame` is None.
+    """
     if offset_frame is None:
         return q
     p = body.principal
@@ -140,7 +148,10 @@ def principal_attitude(q, body, offset_frame):
 
 @inlined
 def principal_matrix(q, R, body, offset_frame):
-    """Matrix of `principal_attitude`, from the matrix R of the body frame (equal unless `offset_frame`)."""
+    """Rotation matrix from the principal frame to the world, from quaternion q and matrix R of the body frame.
+
+    It is R itself where the switch `offset_frame` is None.
+    """
     if offset_frame is None:
         return R
     return qt.to_matrix(principal_attitude(q, body, offset_frame))
@@ -148,7 +159,7 @@ def principal_matrix(q, R, body, offset_frame):
 
 @inlined
 def body_attitude(q, body, offset_frame):
-    """Quaternion of the body frame, from that of the principal frame."""
+    """Quaternion from the body frame to the world, from the quaternion q of the principal frame."""
     if offset_frame is None:
         return q
     p = body.principal
@@ -157,14 +168,17 @@ def body_attitude(q, body, offset_frame):
 
 @inlined
 def apply_inv_inertia(R, L, J):
-    """ω = R I⁻¹ Rᵀ L, world frame [rad/s], R the principal frame in the world, J the inverse principal moments."""
+    """Multiply a world vector L by the inverse inertia: ω = R diag(J) Rᵀ L; of an angular momentum ω is in [rad/s].
+
+    R is the rotation matrix of the principal frame, J the inverse principal moments [1/(kg m²)].
+    """
     m = qt.transposed_matvec(R, L)
     return qt.matvec(R, (J[0] * m[0], J[1] * m[1], J[2] * m[2]))
 
 
 @kernel
 def angular_velocity(q, L, body, offset_frame):
-    """`apply_inv_inertia` of a body with attitude q."""
+    """Angular velocity [rad/s] of a body with attitude q and angular momentum L, world frame."""
     if L[0] == 0.0 and L[1] == 0.0 and L[2] == 0.0:
         return (0.0, 0.0, 0.0)
     return apply_inv_inertia(qt.to_matrix(principal_attitude(q, body, offset_frame)), L, body.J)
@@ -172,13 +186,17 @@ def angular_velocity(q, L, body, offset_frame):
 
 @inlined
 def kinetic_energy(q, v, L, body, offset_frame):
-    """Kinetic energy of one body [J]."""
+    """Kinetic energy of one body with attitude q, velocity v and angular momentum L [J]."""
     return 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, angular_velocity(q, L, body, offset_frame)))
 
 
 @inlined
 def report_solve(report, world, residual, sweeps, method, tolerance):
-    """Add one contact solve to the world's report."""
+    """Add one contact solve to a world's row of `report`.
+
+    `residual` and `tolerance` are relative to the free contact speed, `sweeps` counts iterations, and `method` is one
+    of the METHOD_ codes of `layout`.
+    """
     report[world, at.SOLVES] += 1.0
     report[world, at.ITERATIONS] += sweeps
     report[world, at.RESIDUAL] = max(report[world, at.RESIDUAL], residual)

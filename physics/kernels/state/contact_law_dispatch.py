@@ -1,15 +1,16 @@
-"""Contact laws beyond Coulomb's, which only some scenes declare: dispatch by the type of a body's record.
+"""Contact laws beyond Coulomb's, which only some scenes declare: choose kernels by the type of a body's record.
 
-As with force fields (`fields.terms`): the record of a body has a member `law_rolling` where the scene declares rolling
-friction, its numbers stand in `body.laws`, and a kernel that asks for them is compiled per type of the record. Where
-none is declared nothing of it is compiled, stored or passed on.
+Where a scene declares rolling friction, the record of a body has a member `law_rolling`, likewise for the other laws.
+The member holds no value that is read; its name tells the compiler that the law is declared. The laws' coefficients of
+the body are in `body.laws`. A kernel that depends on a law is compiled for each type of the record. Where a law is not
+declared, nothing of it is compiled, stored or passed on. Force fields do likewise (`force_field_dispatch`).
 """
 
 from __future__ import annotations
 
 from physics.compiler.decorators import backend, by_type, members, when
 
-# Names of the laws, in the order of their numbers in `body.laws` and of their columns, the last of `params`.
+# Names of the laws. Coefficients of declared laws are in this order in `body.laws` and in the last columns of `params`.
 LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
 LAW_STIFFNESS, LAW_DAMPING = "stiffness", "damping"
 LAWS = (LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY, LAW_STIFFNESS, LAW_DAMPING)
@@ -17,7 +18,7 @@ _PREFIX = "law_"
 
 
 def law_members(laws: tuple[str, ...]) -> list[tuple]:
-    """Members of a body's record for these laws; none without laws."""
+    """Fields, in the form of `numpy.dtype`, that a body's record has for these laws; none without laws."""
     if not laws:
         return []
     numbers = [("laws", float, (len(laws),)), *((_PREFIX + name, float) for name in laws)]
@@ -25,21 +26,22 @@ def law_members(laws: tuple[str, ...]) -> list[tuple]:
 
 
 def _declared(record) -> list[str]:
-    """Laws in the record of a body, in a workspace with one, or in the type of either."""
+    """Names of the laws that a body's record declares; `record` may also be a workspace, or the type of either."""
     body = backend.member(record, "body") if "body" in members(record) else record
     return [name[len(_PREFIX) :] for name in members(body) if name.startswith(_PREFIX)]
 
 
 def if_law(laws: tuple[str, ...], instead):
-    """Make a kernel of a function whose last argument is a body's record or the workspace.
+    """Decorate a kernel that is called only in scenes that declare at least one of `laws`.
 
-    Without such laws `instead` takes its place: it takes the same arguments and is inlined.
+    In other scenes the function `instead`, which takes the same arguments, is called in its place and inlined. The last
+    argument of both is a body's record or the workspace; its type decides.
     """
     return when(lambda *types: bool(set(laws) & set(_declared(types[-1]))), instead)
 
 
 def law_parameter(law: str, otherwise: float = 0.0):
-    """Make a kernel (body) that returns a law's number for a body; `otherwise` if undeclared."""
+    """Make a kernel of the argument `body` that returns a law's coefficient, or `otherwise` if it is not declared."""
 
     def chosen(body):
         declared = _declared(body)
@@ -57,7 +59,7 @@ def _nothing(params, i, body):
 
 @if_law(LAWS, _nothing)
 def bind_laws(params, i, body):
-    """Store the laws' numbers of body i in `body`."""
+    """Copy the laws' coefficients of row i of `params`, its last columns, into the record `body`."""
     count = body.laws.shape[0]
     for k in range(count):
         body.laws[k] = params[i, params.shape[1] - count + k]

@@ -1,4 +1,4 @@
-"""Copy and check users' numbers in one pass."""
+"""Copy numbers that a user gives, and check in the same pass that they are finite."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from physics.compiler.simd import LANE_COUNT, Lanes, lane_sum, load_lanes, store
 
 @kernel
 def copy_if_finite(source, target):
-    """Copy (1, n) float64 to (1, n) float64; return whether all are finite, that is whether x - x = 0."""
+    """Copy `source` (1, n) float64 to `target` (1, n) float64; return whether all numbers are finite.
+
+    A number x is finite if and only if x - x = 0.
+    """
     n, k, odd = source.shape[1], 0, 0.0
     first = second = Lanes(0.0, 0.0, 0.0, 0.0)  # two sums side by side: neither waits for the other
     while k + 2 * LANE_COUNT <= n:

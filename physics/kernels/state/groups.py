@@ -1,7 +1,7 @@
-"""Arguments of a step that travel together, as named tuples: switches, arrays of bodies, records of a step.
+"""Arguments that the kernels of a step pass on together, as named tuples: switches, arrays of bodies, records.
 
-A switch is None (off) or not (on). Which of two functions is called, or which of two answers given, is chosen by its
-type (`physics.compiler.decorators.if_given`).
+A switch is None (off) or has a value (on). The compiler knows from its type whether it is on, and compiles only the
+code for that case (`physics.compiler.decorators.if_given`).
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from physics.compiler.decorators import if_given
 
 
 class WorkQueue(NamedTuple):
-    """Worlds that a thread may take, of `physics.kernels.parallel.work_stealing`."""
+    """Worlds that a thread may take, for `physics.kernels.parallel.work_stealing`."""
 
     turns: np.ndarray  # ranges of worlds of all threads
     taken: np.ndarray  # worlds that this thread has taken
 
 
 class TimeGrid(NamedTuple):
-    """Time interval of a call."""
+    """Time that one call of a step kernel advances: steps, their substeps, and the length of a substep."""
 
     steps: int
     substeps: int  # of each step
@@ -39,7 +39,7 @@ class BodyArrays(NamedTuple):
 
 
 class ContactSwitches(NamedTuple):
-    """Switches of a scene's contact."""
+    """Switches of a scene's contact with walls, each None where it is off."""
 
     acts: bool | None  # bodies touch walls
     friction: bool | None  # with friction: three unknowns a contact instead of one
@@ -47,7 +47,7 @@ class ContactSwitches(NamedTuple):
 
 
 class FlightSwitches(NamedTuple):
-    """Switches of the free motion of a scene's bodies."""
+    """Switches of the free motion of a scene's bodies, each None where it is off."""
 
     gyroscopic: bool | None  # moments of inertia differ
     offset_frame: bool | None  # principal axes are not the body's axes, or its centre is not its centre of mass
@@ -55,16 +55,16 @@ class FlightSwitches(NamedTuple):
 
 
 class MultibodySwitches(NamedTuple):
-    """Switches of bodies that touch each other."""
+    """Switches of scenes whose bodies may touch each other, each None where it is off."""
 
     friction: bool | None
     flight: FlightSwitches
-    ellipsoids: bool | None  # some of them are ellipsoids
-    hulls: bool | None  # some of them are hulls
+    ellipsoids: bool | None  # some bodies are ellipsoids
+    hulls: bool | None  # some bodies are hulls
 
 
 class Records(NamedTuple):
-    """Arrays that a step keeps and writes besides the state."""
+    """Arrays, besides the state, that a step writes: warm starts, which it also reads, its report, and its events."""
 
     memory: np.ndarray  # (rows, ...) contacts of the last stage, for warm starts
     report: np.ndarray  # (worlds, REPORT_SIZE) columns of `physics.kernels.state.layout`
@@ -74,11 +74,11 @@ class Records(NamedTuple):
 
 @if_given("switches.friction", False)
 def has_friction(switches):
-    """True where a group of switches has friction on."""
+    """True if the switch `friction` is on, for `ContactSwitches` or `MultibodySwitches`."""
     return True
 
 
 @if_given("flight.scheme", True)
 def flies_exactly(flight):
-    """True unless a textbook scheme moves the bodies."""
+    """True if free motion is the exact flow, False if a textbook scheme (`FlightSwitches.scheme`) moves the bodies."""
     return False

@@ -1,12 +1,13 @@
-"""Columns of the arrays that the kernels share: one for each number of a body.
+"""Columns of the arrays that the kernels share, by name: state, parameters, walls and report.
 
-One row per (world, body), contiguous, so that a step reads what it needs from
-two or three cache lines. `i` is always the flat index world * body_count + body.
+State and parameters have one contiguous row per (world, body), so that a step reads a body from a few cache lines.
+The index `i` of a row is world * body_count + body.
 """
 
 from __future__ import annotations
 
-# Coefficients of s and d, two of first, three of second and four of third order in (|m|², 2E).
+# Number of coefficients of the series s and d of the free rotation: each has two terms of first, three of second and
+# four of third order in |m|² and 2E (`flight.free_rotation`).
 SERIES_SIZE = 18
 
 # --- state (rows, STATE_SIZE): what evolves -------------------------------------------------------------------
@@ -17,7 +18,7 @@ ANGMOM = 10  # angular momentum about the centre of mass, world frame [kg m²/s]
 ANGVEL = 13  # angular velocity, world frame [rad/s]: derived, refreshed at the end of a step
 STATE_SIZE = 16
 
-# --- parameters (rows, PARAM_SIZE): what a world may have its own value of -------------------------------------
+# --- parameters (rows, PARAM_SIZE): numbers that may differ between worlds -------------------------------------
 INV_MASS = 0  # [1/kg]
 INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
 DIMENSIONS = (
@@ -42,12 +43,12 @@ WALL_SIZE = 10
 BLOCK = 0
 SPHERE = 1
 ELLIPSOID = 2
-HULL = 3  # its corners stand in tables: `many.hulls`
+HULL = 3  # corners are in the tables `many.hulls`
 
-# Contact features of one body on one wall: the eight vertices of a block, the one support point of the others.
+# Contact features of a block at a wall: its eight vertices. Spheres and ellipsoids have one, their lowest point.
 VERTEX_COUNT = 8
 
-# Numbers of a state, and accelerations, beyond this are a fault [SI]: products of three of them are still finite.
+# Numbers of a state, or accelerations, above this limit [SI] are a fault; products of three smaller ones are finite.
 OVERFLOW_LIMIT = 1.0e100
 
 # --- report (worlds, REPORT_SIZE) ------------------------------------------------------------------------------
@@ -62,7 +63,7 @@ SPLITS = 7  # impacts that split a substep
 UNRESOLVED = 8  # substeps with more impacts than allowed: the rest was treated as plastic
 SOLVER = 9  # the strongest method needed: METHOD_NONE and so on
 CONTACTS_LEFT_OUT = 10  # contacts and near pairs for which there was no room
-OVERLAP = 11  # deepest overlap of two bodies that were put where they overlap [m], 0 where that is little
+OVERLAP = 11  # deepest overlap of two bodies that were placed into each other [m], 0 where it is small
 FIRST_FAULTY = 12  # 1 + the first body at fault, 0: none
 UNRESOLVED_MOTION = 13  # bodies that moved in fields which the step does not resolve
 REPORT_SIZE = 14

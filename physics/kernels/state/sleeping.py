@@ -1,13 +1,14 @@
-"""Sleeping bodies: the record of each body, and the rule for falling asleep.
+"""Sleeping bodies: the memory of each body's motion, and the rules for falling asleep and waking.
 
-A body is watched in windows of time, from a pose at the start of each. Its way in a window is the largest distance of
-any of its points from there, or what the speed at the end of a substep would move one in it: motion that comes back to
-the same place at the end of each substep is not rest. A window longer than `time` without way is quiet. A body sleeps
-after two quiet windows, in the later of which its way was not `_SLEEP_GROWTH` times that in the one before: what falls
-from an unstable balance goes e^{λT} times as far from window to window, however little it has moved so far.
+The motion of a body is measured in windows of time. The displacement of a body in a window is the largest distance of
+any of its points from its place at the window's start. Its speed at the end of a substep, times the substep, counts
+as a displacement too: a motion that is back at the same place after each substep is not rest. A window is quiet if it
+lasts for `Sleep.time` and its displacement stays below `Sleep.way`. A body falls asleep after two quiet windows, unless
+its displacement in the later one was more than `_SLEEP_GROWTH` times that in the earlier one. Such growth shows a body
+that falls from an unstable balance: from window to window it moves e^{λT} times as far, however little it has moved.
 
-What sleeps is left out of a step with not so much as a look at it. It wakes when the wrench that acts on it becomes
-another; in worlds whose bodies touch each other, also with what it lies on or near (`multibody.data.sleeping`).
+A sleeping body is left out of the step. It wakes when its wrench changes. Where bodies touch each other, it also wakes
+with the bodies that it touches or is near (`multibody.data.sleeping`).
 """
 
 from __future__ import annotations
@@ -18,39 +19,40 @@ import numpy as np
 
 from physics.compiler.decorators import inlined, kernel
 
-# Columns of a body's row; all zero: awake, and nothing known of it yet.
-SLEEP_GROUP = 0  # 0: awake; else the first body of those that sleep and wake together, + 1
-SLEEP_CLOCK = 1  # time since the start of the window [s]; 0: the window is to begin
+# Columns of a body's row. A row of zeros is an awake body whose first window has not begun.
+SLEEP_GROUP = 0  # 0: awake; else 1 + the first body of its sleeping group
+SLEEP_CLOCK = 1  # time since the start of the window [s]; 0: a new window begins with the next substep
 QUIET_WINDOWS = 2  # quiet windows in a row
 WINDOW_DISPLACEMENT, LAST_DISPLACEMENT, EARLIER_DISPLACEMENT = (
     3,
     4,
     5,
 )  # in this window [m], in the last one and the one before [bounding radii]
-WINDOW_POSE = 6  # position [m] and quaternion at its start
-SLEEP_WRENCH = 13  # that acts [N, N m]
+WINDOW_POSE = 6  # position [m] and quaternion at the start of the window
+SLEEP_WRENCH = 13  # last wrench on the body [N, N m]
 SLEEP_SIZE = 19
 
-# Quiet windows before sleep: two are compared.
+# Quiet windows before sleep: their two displacements are compared.
 WINDOWS_BEFORE_SLEEP = 2
 
-# Rigid bodies that fall from an unstable balance have λ² = 0.75 a/r (a rod on its end) to 0.92 a/r (a cube on an edge),
-# r the bounding radius, and go at least e^{λT} = 3.4 times as far in a window of T = √(2 r/a) as in the last. What
-# drifts evenly goes 1 times as far. In between, in the middle:
+# Growth of the displacement from window to window that shows an unstable balance. Rigid bodies that fall from one have
+# λ² = 0.75 a/r (a rod on its end) to 0.92 a/r (a cube on an edge), with the bounding radius r and the acceleration a.
+# In a window of T = √(2 r/a) they move at least e^{λT} = 3.4 times as far as in the last one. A body that drifts evenly
+# moves 1 times as far. The limit is about the geometric mean of both.
 _SLEEP_GROWTH = 2.0
 
 
 class Sleep(NamedTuple):
-    """Sleep of bodies for a step; None if the scene does not declare it."""
+    """Memory and limits of sleeping for a step; in its place is None if the scene does not declare sleep."""
 
     rows: np.ndarray  # (worlds * bodies, SLEEP_SIZE)
-    way: float  # that counts as none [bounding radii]
-    time: float  # of a window [s]; 0: as long as a body would take to fall its bounding radius
+    way: float  # largest displacement of a quiet window [bounding radii]
+    time: float  # length of a window [s]; 0: the time that a body would take to fall its bounding radius
 
 
 @inlined
 def is_asleep(i, sleep):
-    """True if body i sleeps; False if the scene does not declare sleep."""
+    """True if the body in row i sleeps; False if the scene does not declare sleep (`sleep` is None)."""
     if sleep is None:
         return False
     return sleep.rows[i, SLEEP_GROUP] > 0.0
@@ -58,13 +60,13 @@ def is_asleep(i, sleep):
 
 @inlined
 def wake_body(i, sleep):
-    """Wake body i, or restart its window."""
+    """Wake the body in row i; if it is awake, forget its quiet windows and start a new one."""
     sleep.rows[i, SLEEP_GROUP] = sleep.rows[i, SLEEP_CLOCK] = sleep.rows[i, QUIET_WINDOWS] = 0.0
 
 
 @inlined
 def has_new_wrench(i, wrench, sleep):
-    """True if the wrench on body i has changed; the new one is stored."""
+    """True if the wrench on body i differs from the one stored in its row of `sleep`; the new one is stored there."""
     is_other = False
     for c in range(6):
         if wrench[i, c] != sleep.rows[i, SLEEP_WRENCH + c]:
@@ -74,10 +76,10 @@ def has_new_wrench(i, wrench, sleep):
 
 @inlined
 def _way_from_start(i, y, radius, rows):
-    """Bound of the distance of any point of the body from its place at the window's start [m].
+    """Upper bound of the displacement of any point of body i since the start of its window, in the state y [m].
 
-    A turn by θ moves a point by 2 r sin(θ/2) at most, and |q - q0| = 2 sin(θ/4): at most 2 r |q - q0|. Sums of
-    absolute values are no less than norms.
+    A turn by θ moves a point by at most 2 r sin(θ/2), with the bounding radius r. As |q - q0| = 2 sin(θ/4), this is at
+    most 2 r |q - q0|. Norms are replaced by sums of absolute values, which are never smaller.
     """
     x, q, _, _ = y
     far = abs(x[0] - rows[i, WINDOW_POSE]) + abs(x[1] - rows[i, WINDOW_POSE + 1]) + abs(x[2] - rows[i, WINDOW_POSE + 2])
@@ -89,7 +91,10 @@ def _way_from_start(i, y, radius, rows):
 
 @inlined
 def _fastest_point(y, body):
-    """Bound of the speed of any point of the body [m/s]: |v| + r |ω|, |ω| <= |L| over the least moment."""
+    """Upper bound of the speed of any point of a body in the state y [m/s]: |v| + r |ω|.
+
+    r is the bounding radius, and |ω| is at most |L| over the smallest moment of inertia.
+    """
     _, _, v, L = y
     spin = max(body.J[0], body.J[1], body.J[2]) * (abs(L[0]) + abs(L[1]) + abs(L[2]))
     return abs(v[0]) + abs(v[1]) + abs(v[2]) + body.radius * spin
@@ -97,7 +102,7 @@ def _fastest_point(y, body):
 
 @inlined
 def _begin(i, y, rows):
-    """Begin a window at y."""
+    """Start a window of time in which the displacement of body i is measured: store the pose of y, and set it to 0."""
     x, q, _, _ = y
     for c in range(3):
         rows[i, WINDOW_POSE + c] = x[c]
@@ -108,7 +113,11 @@ def _begin(i, y, rows):
 
 @inlined
 def _is_over(clock, body, sleep):
-    """True if a window of this length is over: √(2 r/a) is the time to fall r at a."""
+    """True if a window of time, in which displacements are measured, is over after `clock` [s].
+
+    Its length is `sleep.time`, or if that is 0 the time √(2 r/a) in which the body, with its acceleration a, falls its
+    bounding radius r.
+    """
     if sleep.time > 0.0:
         return clock >= sleep.time
     return clock * clock * body.acceleration >= 2.0 * body.radius
@@ -116,7 +125,11 @@ def _is_over(clock, body, sleep):
 
 @kernel
 def update_sleep_window(i, y, h, body, sleep):
-    """Record the place of body i after a substep of h; return whether the last of enough quiet windows has ended."""
+    """Update the window of time in which the displacement of body i is measured, after a substep of h [s] to y.
+
+    Returns True when a quiet window, with little displacement, has just ended, and the body has had
+    `WINDOWS_BEFORE_SLEEP` of them in a row.
+    """
     rows = sleep.rows
     if rows[i, SLEEP_CLOCK] == 0.0:
         _begin(i, y, rows)
@@ -139,19 +152,22 @@ def update_sleep_window(i, y, h, body, sleep):
 
 @inlined
 def is_motion_growing(last, before):
-    """True if the displacement in the last window shows a motion that grows."""
+    """True if the displacement `last`, in the last window of time, is more than `_SLEEP_GROWTH` times that `before`."""
     return not last <= _SLEEP_GROWTH * before
 
 
 @inlined
 def without_velocities(y):
-    """State y without velocities."""
+    """State y with velocity and angular momentum set to zero."""
     return y[0], y[1], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @inlined
 def remains_asleep(i, wrench, sleep):
-    """True if body i, which meets walls only, sleeps and stays asleep under this wrench."""
+    """True if body i sleeps and stays asleep, because its wrench is the same; a new wrench wakes it.
+
+    For scenes whose bodies touch walls only; others have `multibody.data.sleeping`.
+    """
     if has_new_wrench(i, wrench, sleep):
         wake_body(i, sleep)
     return sleep.rows[i, SLEEP_GROUP] > 0.0
@@ -159,7 +175,11 @@ def remains_asleep(i, wrench, sleep):
 
 @inlined
 def falls_asleep(i, y, h, body, sleep):
-    """Do `update_sleep_window` for body i, which meets walls only; return whether it falls asleep now."""
+    """Put body i to sleep if it has moved little for two windows of time (`update_sleep_window`).
+
+    y is the state after a substep of h [s]. Returns whether the body has fallen asleep. For scenes whose bodies touch
+    walls only; others have `multibody.data.sleeping`.
+    """
     if update_sleep_window(i, y, h, body, sleep) and not is_motion_growing(
         sleep.rows[i, LAST_DISPLACEMENT], sleep.rows[i, EARLIER_DISPLACEMENT]
     ):

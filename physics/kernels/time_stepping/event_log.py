@@ -1,6 +1,7 @@
-"""Log of events: one row per event, in the order of the bodies.
+"""Log the events of a step, such as impacts: one row per event, for each body in order of time.
 
-A step that has no room for events (`World.make_event_room`) logs none, and asks once per impact whether it has.
+`log` (rows, room, EVENT_SIZE) has the events of each body, `counts` (rows,) their number. A step without room for
+events (`World.make_event_room`), room = 0, logs none.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ from physics.kernels.math import quaternion as qt
 KIND_IMPACT, KIND_TOUCH, KIND_RELEASE, KIND_STICK, KIND_SLIP, KIND_REST, KIND_FAULT = range(7)
 KIND_NAMES = ("impact", "touch", "release", "stick", "slip", "rest", "fault")
 
-# Columns: time since the start of the step [s], kind, wall and other body (-1: none), and of an impact the impulse on
-# the body [N s], the point where it acts [m] and the unit normal towards the body, all three in the world frame.
+# Columns of an event: time since the start of the call [s], kind, wall and other body (-1: none); for an impact also
+# the impulse on the body [N s], the point where it acts [m] and the unit normal towards the body, in the world frame.
 EVENT_TIME, EVENT_KIND, EVENT_WALL, EVENT_OTHER, EVENT_IMPULSE, EVENT_POINT, EVENT_NORMAL = 0, 1, 2, 3, 4, 7, 10
 EVENT_SIZE = 13
 
 NOBODY = -1
 
-# An impulse of this share of the largest of the same impact is rounding.
+# An impulse below this share of the largest impulse of the same impact is rounding.
 EVENT_IMPULSE_ROUNDING = 1.0e-14
 
 
 class EventRow(NamedTuple):
-    """Event of a body; all vectors in the world frame, zero where undefined."""
+    """One event of a body; vectors are in the world frame, and zero for kinds of events without them."""
 
     kind: int  # KIND_IMPACT and so on
     wall: int  # wall, or NOBODY
@@ -40,7 +41,7 @@ class EventRow(NamedTuple):
 
 @kernel
 def note_event(log, counts, i, t, event):
-    """Add an `EventRow` of body i at the time t [s]; an event without room is only counted."""
+    """Add an event (`EventRow`) of body i at the time t [s] to the log; an event without room is only counted."""
     k = counts[i]
     counts[i] = k + 1
     if k < log.shape[1]:
@@ -54,7 +55,10 @@ def note_event(log, counts, i, t, event):
 
 @inlined
 def clear_events(world, bodies, log, counts):
-    """Clear the events of a world, if its log has room for any."""
+    """Set the event counts of all bodies of a world to zero, if the log has room for events.
+
+    `bodies` is the number of bodies in a world.
+    """
     if log.shape[1] > 0:
         for i in range(world * bodies, (world + 1) * bodies):
             counts[i] = 0
@@ -62,7 +66,10 @@ def clear_events(world, bodies, log, counts):
 
 @kernel
 def drop_events(world, bodies, t, log, counts):
-    """Remove a world's events from the time t on, after its state was put back."""
+    """Remove the events of a world at times from t [s] on, for a state that was put back to the time t.
+
+    `bodies` is the number of bodies in a world.
+    """
     for i in range(world * bodies, (world + 1) * bodies):
         while 0 < counts[i] <= log.shape[1] and log[i, counts[i] - 1, EVENT_TIME] >= t:
             counts[i] -= 1
@@ -70,17 +77,17 @@ def drop_events(world, bodies, t, log, counts):
 
 @inlined
 def note_mode_change(log, counts, i, t, kind, wall):
-    """Add an event of body i without an impulse."""
+    """Add an event of body i at a wall, without an impulse, to the log: time t [s], `kind` KIND_TOUCH and so on."""
     zero = (0.0, 0.0, 0.0)
     note_event(log, counts, i, t, EventRow(kind, wall, NOBODY, zero, zero, zero))
 
 
 @inlined
 def add_weighted_contact(sums, normal, pushed, point):
-    """Add a contact to the weighted sums of its pair: of normals, of points, and of weights.
+    """Add a contact to the sums (normals, points, weights) of the contacts of one pair; return the new sums.
 
-    The weights are the normal impulses: where the normals are the same the mean point is that about which these have
-    no moment.
+    Normals and points are weighted by the normal impulse `pushed` [N s]. If all normals are the same, the normal
+    impulses have no moment about the mean point.
     """
     n, r, weight = sums
     s = max(pushed, 0.0)
@@ -93,7 +100,11 @@ def add_weighted_contact(sums, normal, pushed, point):
 
 @inlined
 def note_impact(log, counts, i, t, wall, other, impulse, sums):
-    """Add the impact of body i with a wall or a body, from its impulse and the sums of `add_weighted_contact`."""
+    """Add the impact of body i with a wall or another body to the log, if it has pushed.
+
+    t is its time [s], `impulse` the sum over its contacts [N s]. Point and normal are the means of the weighted sums
+    of `add_weighted_contact`.
+    """
     n, r, weight = sums
     size = math.sqrt(qt.dot(n, n))
     if not (weight > 0.0 and size > 0.0):
@@ -104,9 +115,10 @@ def note_impact(log, counts, i, t, wall, other, impulse, sums):
 
 @kernel
 def log_wall_impacts(n, width, x, least, t, scratch, log, counts):
-    """One event per wall with the sum of the impulses of its contacts in `scratch`, if that is more than `least` [N s].
+    """Log one impact for each wall whose contacts in `scratch` have a total impulse of more than `least` [N s].
 
-    `width` is the number of impulses of a contact, 1 without friction and 3 with it; x where the body is [m].
+    n is the number of contacts, `width` the number of impulses of each, 1 without friction and 3 with it. x is the
+    position of the body [m], t the time of the impacts [s].
     """
     contacts = scratch.contacts
     walls = scratch.scene.walls

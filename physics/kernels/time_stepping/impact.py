@@ -1,4 +1,4 @@
-"""Impact stage of a substep: velocities jump by the impulses of the contacts that approach."""
+"""Resolve the impacts of a body with walls: its velocities jump by the impulses of contacts that approach."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from physics.kernels.time_stepping.tangential_restitution import reject_energy_g
 
 @inlined
 def set_plastic_targets(n, contacts):
-    """Targets and first guess of an impact without rebound."""
+    """Set zero targets and zero initial impulses for n contacts: an impact without rebound."""
     for k in range(3 * n):
         contacts.impulse[k] = 0.0
     for i in range(n):
@@ -35,10 +35,11 @@ def set_plastic_targets(n, contacts):
 
 @inlined
 def resolve_impacts(n, y, t, h, contact, offset_frame, records, scratch):
-    """State after the impulses of the contacts that approach, unchanged without one; and whether nothing was hit.
+    """Resolve the impacts of n contacts in the state y: (state after the impulses, is_persistent).
 
-    The impact is t [s] after the start of the call, with h [s] left of the substep. A contact that continues from the
-    last stage has hit nothing: its impulses are in `contacts.rebound`, and belong to the forces of the next stage.
+    The impact is t [s] after the start of the call, with h [s] left of the substep. Without an impact the state stays
+    the same. `is_persistent` is true if only persistent contacts, which continue from the last stage, got impulses:
+    then nothing was hit, and the impulses, in `contacts.rebound`, belong to the contact forces of the next stage.
     """
     settings, body, stage, contacts = scratch.settings, scratch.body, scratch.stage, scratch.contacts
     x, q, v, L = y

@@ -1,13 +1,13 @@
-"""Friction of a stage against the mean of the slip velocities before and after it: of second order.
+"""Friction of a stage against the mean of the slip velocities before (u⁰) and after it (u¹): of second order.
 
-In Moreau's step the friction of the whole stage opposes the slip velocity u¹ at its end: an error of first order
-wherever the direction of sliding turns, and that of a vertex may turn by 90° within a few steps. Against the mean
-½ (u⁰ + u¹) it is the midpoint rule, of second order, and its work, -μ p_n |½ (u⁰ + u¹)|, is what the energy loses:
-that of any impulse is its product with the mean velocity. To the solver, which asks for friction against u less its
-target, that is the target -u⁰.
+In Moreau's step friction opposes the slip u¹ at the end of the stage. Where the direction of sliding turns, this is an
+error of first order, and the slip of a vertex may turn by 90° within a few steps. Friction against the mean slip
+½ (u⁰ + u¹) is the midpoint rule, of second order. Its work -μ p_n |½ (u⁰ + u¹)| is the energy that the body loses,
+since any impulse changes the energy by its product with the mean velocity. The solver opposes friction to the velocity
+u less its target. So the target -u⁰ makes it oppose the mean.
 
-Such friction cannot stop a contact, only turn it round. Where it does, u¹·u⁰ < 0, the stage is solved once more with
-friction against u¹. So are stages in which nothing slips at first.
+Such friction cannot stop a contact, it can only reverse its slip. If it does (u¹·u⁰ < 0), the stage is solved once more
+with friction against u¹. Stages in which not all contacts slip at first have friction against u¹, too.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
 from physics.kernels.state.groups import has_friction
 from physics.kernels.state.layout import SPHERE, WALL_TANGENT_1
 
-# Contacts of a stage at most, `mean_slip` of the settings, for `physics.Accuracy.slip`. The slips of a face turn
-# slowly, as a whole, and a solve more is dear there.
+# Largest number of contacts of a stage in which friction opposes the mean slip (`physics.Accuracy.slip`, the setting
+# `mean_slip`). The slips of a face's contacts turn slowly, and a second solve takes long there.
 MEAN_SLIP_CONTACTS = 2
 
-# A contact that held slips by less than this many times the error of its target.
+# A contact that stuck in the last stage slips now by less than this many times the error of its target.
 _SLIP_MARGIN = 2.0
 
 
 @inlined
 def _tangential(i, v, w, scratch):
-    """Tangential velocity of the body at contact i [m/s]."""
+    """Velocity of contact point i along the two tangents of its wall [m/s], from velocity v and angular velocity w."""
     walls, k = scratch.scene.walls, wall_of(scratch.contacts.slot[i], scratch.scene)
     m = qt.cross(w, contact_arm(scratch.contacts, i))
     x, y, z = v[0] + m[0], v[1] + m[1], v[2] + m[2]
@@ -47,11 +47,11 @@ def _tangential(i, v, w, scratch):
 
 @inlined
 def _least_slip(w, h, scratch):
-    """Slip at the start of a stage up to which a contact holds [m/s].
+    """Slip at the start of a stage up to which a contact counts as sticking [m/s].
 
-    The limit is the error of a sticking contact's target (`target_velocity.set_resting_targets`) in the stage before.
-    It is the tolerance of its solve plus h² (ω α + ω³ r); for a sphere, whose arm does not turn with it, the tolerance
-    alone.
+    The limit is the error that the last stage, of length h, may leave in a sticking contact. This is the tolerance of
+    its solve, plus the error h² (ω α + ω³ r) of its target (`target_velocity.set_resting_targets`). The arm of a sphere
+    does not turn with the sphere, so it only has the tolerance. w is the angular velocity.
     """
     body = scratch.body
     least = scratch.settings.tolerance * body.acceleration * h
@@ -63,7 +63,9 @@ def _least_slip(w, h, scratch):
 
 @if_given("contact.friction", False)
 def oppose_mean_slip(n, contact, v, w, h, scratch):
-    """Let friction oppose the mean slip of the stage; return whether all contacts slip.
+    """Set tangential targets so that friction opposes the mean slip of the stage, if all n contacts slip.
+
+    Returns whether all contacts slip; if not, nothing is changed.
 
     Parameters
     ----------
@@ -74,9 +76,9 @@ def oppose_mean_slip(n, contact, v, w, h, scratch):
 
     Notes
     -----
-    Changes the tangents of `contacts.target`, which `target_velocity.set_resting_targets` has set: what the turning of
-    its arm takes from a contact in half a stage (kept in `contacts.held_target`). Added to the velocity at the middle
-    it gives the one at the start.
+    The tangential parts of `contacts.target` are replaced. Those before, from `target_velocity.set_resting_targets`,
+    are kept in `contacts.held_target`. They are minus the velocity that a contact gains by turning in half a stage, so
+    added to the slip in the middle they give the slip at the start.
     """
     contacts = scratch.contacts
     least = _least_slip(w, h, scratch)
@@ -94,14 +96,18 @@ def oppose_mean_slip(n, contact, v, w, h, scratch):
 
 @inlined
 def oppose_end_slip(n, contacts):
-    """Undo `oppose_mean_slip`."""
+    """Let friction oppose the slip at the end of the stage again: restore the tangential targets of n contacts."""
     for i in range(n):
         contacts.target[i, 1], contacts.target[i, 2] = contacts.held_target[i, 0], contacts.held_target[i, 1]
 
 
 @inlined
 def has_slip_reversed(n, v, w, scratch):
-    """True if the slip of a pushing contact opposes the earlier slip, -`contacts.target`, after impulses."""
+    """True if a pushing contact has reversed its slip: the slip after the impulses opposes that before the stage.
+
+    v and w are velocity and angular velocity after the impulses. The slip before is minus the tangential target that
+    `oppose_mean_slip` has set.
+    """
     contacts = scratch.contacts
     ratio = friction_ratio(scratch.body)
     for i in range(n):
@@ -118,15 +124,24 @@ def _as_solved(n, contact, v, w, solved, free, R, h, scratch):
 
 @if_law((LAW_STIFFNESS,), _as_solved)
 def cap_friction_work(n, contact, v, w, solved, free, R, h, scratch):
-    """Result of `solve_contacts` for `free` (v, L), with friction against the mean slip if it created energy.
+    """Solve the contacts of a compliant stage again, with friction against the mean slip, if friction created energy.
 
     An impulse p adds the energy p·½(u⁰ + u¹). Friction that stops a contact adds ½ p_t·u⁰. In a rigid impact the normal
-    impulse outweighs this. The push of a spring depends on its depth, and may not.
+    impulse takes more energy than that. The push of a spring depends on its depth, and may take less.
 
     Parameters
     ----------
     v, w : tuples of 3 floats
         Velocity and angular velocity before the stage, at the attitude R of its middle.
+    solved : tuple
+        Result of `solve_contacts` with the present targets.
+    free : tuple
+        Velocity and angular momentum with loads and without contact impulses.
+
+    Returns
+    -------
+    tuple
+        Result of `solve_contacts`: `solved`, or the new one.
     """
     body, contacts = scratch.body, scratch.contacts
     if not has_friction(contact):

@@ -1,4 +1,7 @@
-"""Contact stage of a substep: Moreau's midpoint step, half a free drift, the contact problem, half a free drift."""
+"""Advance a body in contact over a stage by Moreau's midpoint step.
+
+The stage has three parts: half a free drift, the contact problem at the middle, half a free drift.
+"""
 
 from __future__ import annotations
 
@@ -33,19 +36,20 @@ from physics.kernels.time_stepping.rolling_friction import apply_resistance_torq
 from physics.kernels.time_stepping.stage_energy import limit_stage_energy
 from physics.kernels.time_stepping.warm_start import load_warm_start, store_warm_start
 
-# Slops that a body pressed against a wall by strong loads may move in a step.
+# Share of a slop by which a body that strong loads press against a wall may move in a stage.
 CREEP_SLOP_SHARE = 0.01
 
-# Slops by which sticking contacts may miss their targets in a step.
+# Share of a slop by which errors in the targets of sticking contacts may move them in a stage.
 TARGET_ERROR_SLOP_SHARE = 0.01
 
 
 @inlined
 def rest_residual(h, scratch):
-    """Largest residual of a resting stage of length h, whatever the tolerance allows [m/s].
+    """Limit of the contact residual in a resting stage of length h [m/s], in addition to the tolerance ε.
 
-    A residual of ε a h lets a body drift by ε a h² per step. Strong loads make this more than a slop, and a body
-    pressed against a wall would creep. Then the residual is limited so that the drift is a small part of a slop.
+    Under loads of acceleration a the tolerance allows a residual of ε a h, by which a body drifts by ε a h² per stage.
+    Under strong loads this is more than a slop, and a body pressed against a wall would creep. Then the residual is
+    limited so that the drift is a small share of a slop; otherwise the limit is infinite.
     """
     slop_speed = scratch.body.slop / h
     if scratch.settings.tolerance * scratch.body.acceleration * h > slop_speed:
@@ -59,14 +63,21 @@ def _no_acceleration(flight, R, m, wb, J):
 
 @if_given("flight.gyroscopic", _no_acceleration)
 def _gyroscopic_acceleration(flight, R, m, wb, J):
-    """Angular acceleration J (m x wb) of a body with unequal moments, turned to the world [rad/s²]."""
+    """Angular acceleration of free turning, J (m x wb), world frame [rad/s²]; zero if all moments are equal.
+
+    m and wb are angular momentum and angular velocity in the principal frame, R is the matrix of that frame, and J the
+    inverse moments.
+    """
     g = qt.cross(m, wb)
     return qt.matvec(R, (J[0] * g[0], J[1] * g[1], J[2] * g[2]))
 
 
 @inlined
 def midpoint_step(n, y, h, contact, flight, records, scratch):
-    """State after Moreau's midpoint step over h with the n contacts of the set."""
+    """State after Moreau's midpoint step of length h [s] from y, with the n contacts of the contact set.
+
+    Warm starts are read from `records.memory`; the new impulses are stored there, and the solve goes to the report.
+    """
     body, stage, contacts = scratch.body, scratch.stage, scratch.contacts
     x, q, v, L = y
     a, torque = body.free_acceleration, body.torque

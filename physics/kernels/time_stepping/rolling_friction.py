@@ -1,15 +1,14 @@
-"""Torques of contact on round bodies: rolling and spin friction.
+"""Rolling and spin friction of round bodies: torques of contact against their rotation.
 
-Rolling and spin friction are torques. With the normal impulse p of a contact, ω its angular velocity, n the normal,
+Let p be the normal impulse of a contact, n its normal, and ω the angular velocity of the body. The angular impulse T is
 
-    across the normal   |T| <= a p,    T against ω - (n·ω) n   (rolling)
-    along the normal    |T| <= b p,    T against (n·ω) n       (spin)
+    across the normal   |T| <= a p,    T against ω - (n·ω) n   (rolling friction, coefficient a [m])
+    along the normal    |T| <= b p,    T against (n·ω) n       (spin friction, coefficient b [m])
 
-Each is as large as allowed while there is a rotation to oppose, and at most as large as stops it. The stage knows p
-only when its contacts are solved, and friction answers to the torque: it slows a rolling ball as a whole, but not a
-sliding one. So the stage is solved again with the whole torque among the loads of the body. If that would reverse the
-rotation, the share of the torque that leaves none is used. False position finds it, since between the changes from
-sticking to sliding the contact problem is linear.
+Each part has its largest size while there is a rotation to oppose, and at most the size that stops the rotation. p is
+known only when the contacts of the stage are solved, and their friction responds to T. So the stage is solved again,
+with T added to the angular momentum of the body. If T would reverse the rotation, the share of T that stops it is used.
+False position finds this share, since the contact problem is linear between changes from sticking to sliding.
 
 References
 ----------
@@ -30,10 +29,10 @@ from physics.kernels.state.body import apply_inv_inertia
 from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, if_law, law_parameter
 from physics.kernels.state.layout import BLOCK
 
-# Solutions of the contact problem for one torque at most; two are usual, one where the body goes on turning.
+# Largest number of solves of the contact problem for one torque. Two are usual, one if the body goes on turning.
 _MAX_TORQUE_TRIALS = 5
 
-# A body stands still when the torque's power is this share of what it was without it: some roundings.
+# The rotation has stopped when the power of the torque is below this share of its power without the torque.
 _STOPPED_POWER_SHARE = 1.0e-13
 
 rolling_radius = law_parameter(LAW_ROLLING)
@@ -47,7 +46,11 @@ def _added(L, s, T):
 
 @inlined
 def _against(n, width, across, along, w, scratch):
-    """Angular impulse against the turning w, from normal impulses in `scratch`, with arms across and along normals."""
+    """Angular impulse [kg m²/s] of n contacts against the angular velocity w, from normal impulses in `scratch`.
+
+    `across` and `along` are the coefficients [m] of rolling and of spin friction; `width` is the number of impulses per
+    contact.
+    """
     x = y = z = 0.0
     for k in range(n):
         p = max(scratch.contacts.impulse[width * k], 0.0)
@@ -63,7 +66,11 @@ def _against(n, width, across, along, w, scratch):
 
 @kernel
 def _resist(n, contact, across, along, v, L, solved, R, scratch):
-    """Solve with one torque: result of `solve_contacts`, and L with the torque but without the contacts."""
+    """Solve the contacts with the friction torque of one kind: (new result of `solve_contacts`, L with the torque).
+
+    v and L are velocity and angular momentum without contact impulses, and `solved` is the result of `solve_contacts`
+    without the torque. `across` and `along` are the coefficients [m] of rolling and of spin friction, one of them 0.
+    """
     width = rows_per_contact(contact)
     w = apply_inv_inertia(R, solved[1], scratch.body.J)
     T = _against(n, width, across, along, w, scratch)
@@ -94,7 +101,11 @@ def _as_solved(n, contact, v, L, solved, R, scratch):
 
 @if_law((LAW_ROLLING, LAW_SPIN), _as_solved)
 def apply_resistance_torques(n, contact, v, L, solved, R, scratch):
-    """Result of `solve_contacts` for v and L, with the torques of rolling and spin friction on a round body."""
+    """Apply the torques of rolling and spin friction to a round body, and return the new result of `solve_contacts`.
+
+    v and L are velocity and angular momentum without contact impulses, and `solved` is the result of `solve_contacts`
+    for them. It is returned as it is for blocks, and in scenes without these laws.
+    """
     body = scratch.body
     if body.shape == BLOCK:
         return solved

@@ -1,7 +1,8 @@
-"""Extrapolated midpoint rule, to a tolerance, for all bodies tied by springs at once.
+"""Extrapolated midpoint rule, to a tolerance, for all bodies of a world that springs tie together and touch nothing.
 
-As `events.smooth` does for one body (Gragg's rule with 2, 4, 6, ... parts, Neville's table in the squares of the parts'
-length; two neighbours that agree end the step), but there is nothing to touch: a step is cut for its error alone.
+A step is made by Gragg's midpoint rule with 2, 4, 6, ... parts. Neville's table extrapolates the results in the square
+of the parts' length. When two successive values of the table agree to the tolerance, the step is done; if none do, it
+is made shorter. `event_driven.smooth_segment` does the same for one body in contact.
 
 Reference: E. Hairer, S. P. Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., 1993, II.9.
 """
@@ -18,15 +19,17 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 
-# Rules of 2, 4, 6, ... parts: order 16 with eight.
+# Largest number of midpoint rules, with 2, 4, 6, ... parts: eight of them give order 16.
 _MAX_RULES = 8
 LINKED_STATE_SIZE = 13  # numbers of a state: x, q, v, L
 
-# Planes of `room`: the table, one per rule, then two states and a rate.
+# Planes of `room`, each with a state of every body: one for each row of Neville's table, then the state before the
+# present part, the present state, and its rate.
 PLANE_BEFORE, PLANE_HERE, PLANE_RATE = _MAX_RULES, _MAX_RULES + 1, _MAX_RULES + 2
 PLANE_COUNT = _MAX_RULES + 3
 
-# A step is cut to this share where the rules do not agree; the next one is this much longer where EASY of them did.
+# A step is cut to this share if the rules do not agree. The next step is longer by the second factor if _EASY_RULES
+# rules or fewer were enough.
 _STEP_CUT = 0.25
 _STEP_GROWTH = 2.0
 _EASY_RULES = 5
@@ -34,7 +37,10 @@ _EASY_RULES = 5
 
 @kernel
 def _put_rate(t, offset_frame, linked):
-    """Write the rates of all bodies in the state `PLANE_HERE` at time t [s] into `PLANE_RATE`."""
+    """Compute the rates of change of all bodies' states, at the time t [s].
+
+    The states are in the plane PLANE_HERE of `linked.room`; the rates go to the plane PLANE_RATE.
+    """
     room, bodies = linked.room, linked.body
     for b in range(bodies.shape[0]):
         s = room[PLANE_HERE, b]
@@ -58,7 +64,7 @@ def _put_rate(t, offset_frame, linked):
 
 @inlined
 def _put_start(linked):
-    """Copy the states of the bodies into `PLANE_BEFORE` and `PLANE_HERE`."""
+    """Copy the states of the bodies, `linked.state`, into the planes PLANE_BEFORE and PLANE_HERE of `linked.room`."""
     for b in range(linked.state.shape[0]):
         x, q, v, L = read_state(linked.state, b)
         for plane in (PLANE_BEFORE, PLANE_HERE):
@@ -71,7 +77,10 @@ def _put_start(linked):
 
 @kernel
 def _midpoint(parts, h, t, row, offset_frame, linked):
-    """Do Gragg's rule of so many parts, an even number, over h from time t into row `row` of the table."""
+    """Advance all bodies over h from the time t [s] by Gragg's midpoint rule, into row `row` of Neville's table.
+
+    `parts` is the even number of parts of the rule.
+    """
     room, s = linked.room, h / parts
     _put_start(linked)
     for k in range(parts):
@@ -92,9 +101,11 @@ def _midpoint(parts, h, t, row, offset_frame, linked):
 
 @kernel
 def _extrapolate(row, h, linked):
-    """Add a rule to Neville's table: its best value then stands in row 0, with that value's error.
+    """Extrapolate with a new rule in row `row` of Neville's table; row 0 then has the best value. Return its error.
 
-    Row j holds T of rule j and column row - j. The error is relative to size, or speed and what the step makes of it.
+    Row j has the table's value of rule j and column row - j. The error is the largest change of row 0, relative: of
+    positions to speed times h, of velocities to the speed, of angular momenta to speed times mass and radius, of
+    quaternions to 1. The speed is that of the body plus its bounding radius over h.
     """
     room, worst = linked.room, 0.0
     for b in range(linked.state.shape[0]):
@@ -120,7 +131,10 @@ def _extrapolate(row, h, linked):
 
 @kernel
 def extrapolate_linked(h, offset_frame, linked):
-    """Advance all bodies by h, to the tolerance; return whether the allowed steps sufficed."""
+    """Advance all bodies of `linked` (a `LinkedWorld`) by h [s], to its tolerance.
+
+    Returns False if `linked.most` steps were not enough; the bodies have then advanced by less than h.
+    """
     start, t, step = linked.body[0].now, 0.0, h
     for _ in range(linked.most):
         step = min(step, h - t)
@@ -147,6 +161,6 @@ def extrapolate_linked(h, offset_frame, linked):
 
 @kernel
 def step_linked_segment(world, h, offset_frame, report, linked):
-    """Do `extrapolate_linked`, and report failures."""
+    """Advance all bodies of a world by h [s] to the tolerance (`extrapolate_linked`); report it if that fails."""
     if not extrapolate_linked(h, offset_frame, linked):
         report[world, at.UNRESOLVED] += 1.0

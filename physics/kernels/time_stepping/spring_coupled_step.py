@@ -1,8 +1,8 @@
-"""Step of worlds whose bodies are tied by springs and touch nothing: all bodies of a world at once.
+"""Step worlds whose bodies are tied by springs and touch nothing: all bodies of a world advance together.
 
-`physics.kernels.time_stepping.step` advances each body to the end of the call before it looks at the next; here all of
-them go from stage to stage together. Where bodies may touch something it is `physics.kernels.multibody.stepping.step`
-that does so.
+Springs between bodies make their motions depend on each other, so all of them go from substep to substep together.
+`physics.kernels.time_stepping.step` advances each body alone to the end of the call, and
+`physics.kernels.multibody.stepping.step` steps bodies that may also touch something.
 """
 
 from __future__ import annotations
@@ -42,20 +42,23 @@ from physics.kernels.time_stepping.workspace import body_fields
 
 
 class LinkedWorld(NamedTuple):
-    """Bodies of the world that a thread steps."""
+    """Scratch memory of one thread: the bodies of the world that it steps."""
 
     body: np.ndarray  # records: parameters and loads, see `workspace.body_fields`
     state: np.ndarray  # columns of `layout`
     touched: np.ndarray  # 0: no body is in contact
     room: np.ndarray  # states and rates of `spring_coupled_extrapolation`
-    tolerance: float
-    most: int  # steps of `spring_coupled_extrapolation` in one of the caller's at most
+    tolerance: float  # largest error of a step of `spring_coupled_extrapolation`
+    most: int  # largest number of such steps in one substep
 
 
 def make_linked_world(
     bodies: int, terms: tuple[Term, ...], *, relative_slop: float, tolerance: float, splits: int
 ) -> LinkedWorld:
-    """Scratch for worlds of so many bodies in these fields; `splits` are the steps of an extrapolation at most."""
+    """Make the scratch memory for worlds of `bodies` bodies with the force fields `terms`.
+
+    `relative_slop` is in bounding radii. `splits` is the largest number of extrapolated steps in a substep.
+    """
     rows = np.zeros(bodies, np.dtype(body_fields(terms)))
     rows["relative_slop"] = relative_slop
     now, touched, room = (
@@ -68,7 +71,7 @@ def make_linked_world(
 
 @kernel
 def _substep(h, flight, linked):
-    """Advance all bodies by h with the loads of the middle."""
+    """Advance all bodies of a world by h [s], with the loads of the middle held over the whole substep."""
     hold_linked_loads(h, flight.gyroscopic, flight.offset_frame, linked)
     note_stage_energy(flight.offset_frame, linked, linked.body[0])
     for b in range(linked.state.shape[0]):
@@ -79,10 +82,11 @@ def _substep(h, flight, linked):
 
 @inlined
 def advance_world(world, grid, bodies, flight, held, events, records, linked):
-    """Advance a world by `grid.steps` steps.
+    """Advance the bodies of a world by `grid.steps` steps; write their states and the world's report.
 
-    Of the switches `held` and `events` one is on: loads held over the step, or motion to the tolerance. A world in
-    which a new state is not finite keeps the last good one, and its report counts the fault.
+    One of the switches `held` and `events` is on: with `held` loads are held over each substep, with `events` the
+    motion is integrated to a tolerance. If the new state of any body is not finite, all bodies of the world keep the
+    last good states, and the report counts a fault.
     """
     h, count = grid.h, bodies.shapes.shape[0]
     clear_report(world, records.report)
@@ -121,5 +125,8 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_linked(queue, grid, bodies, flight, held, events, records, linked):
-    """Advance the worlds that no other thread has taken, with bodies tied by springs: `advance_world`."""
+    """Advance all worlds that the calling thread can take from `queue`, whose bodies are tied by springs.
+
+    See `advance_world`; `linked` is the thread's scratch memory.
+    """
     _advance_worlds(queue, (grid, bodies, flight, held, events, records, linked))

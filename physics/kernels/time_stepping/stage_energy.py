@@ -1,4 +1,4 @@
-"""Energy of a resting stage: impulses that raise it are replaced by those of dissipative targets."""
+"""Keep the impulses of a resting stage from creating energy, by a second solve with dissipative targets."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS, if_law
 
 @inlined
 def motion_square(n, velocity, scratch):
-    """Square of the velocity that contacts may change: without friction at one wall, only the normal part.
+    """Square of the part of a body's velocity that n contacts may change [m²/s²].
 
-    The result must not depend on the velocity of a body along a frictionless wall.
+    Contacts without friction at a single wall only change the normal velocity, so only its square counts.
     """
     scene = scratch.scene
     wall = wall_of(scratch.contacts.slot[0], scene)
@@ -29,10 +29,12 @@ def motion_square(n, velocity, scratch):
 
 @inlined
 def has_energy_gain(n, before, w, v, L, solved, R, h, scratch):
-    """True if the impulses of a resting stage raise the energy beyond the errors of its solve and its step.
+    """True if the impulses of a resting stage of length h raise the energy beyond the errors of solve and step.
 
-    Impulses P at the centre of mass and moments Q about it change it by ½ P·(v + v') + ½ Q·(ω + ω'), v and ω before
-    the stage (`before`, w), v' and ω' after it. `v`, `L` are those with loads and without impulses.
+    `before` and w are velocity and angular velocity before the stage. v and L are velocity and angular momentum with
+    loads and without contact impulses, and `solved` is the result of `solve_contacts` for them. Let P be the sum of
+    the impulses, Q their moment about the centre of mass, v' and ω' the velocities after the stage. The impulses change
+    the energy by ½ P·(before + v') + ½ Q·(w + ω').
     """
     body = scratch.body
     v_new, L_new, _, _, _ = solved
@@ -58,11 +60,11 @@ def has_energy_gain(n, before, w, v, L, solved, R, h, scratch):
 
 @inlined
 def set_dissipative_targets(n, before, w, scratch):
-    """Set targets that cannot raise the energy: none lets a contact gain speed, and leaving contacts are reversed.
+    """Set targets of n contacts with which impulses cannot raise the energy.
 
-    A push p changes the energy by p·½(u + u'), with u and u' the normal velocities of its contact before and after. So
-    a leaving contact, u > 0, that loads bring back within the stage comes back as fast as it left. It is not stopped
-    above its wall.
+    A push p changes the energy by p·½(u + u'), with the normal velocities u and u' of its contact before and after. So
+    the normal target is at most 0 for a contact that approaches, and at most -u for one that leaves. Tangential targets
+    are 0. `before` and w are velocity and angular velocity before the stage.
     """
     contacts = scratch.contacts
     for i in range(n):
@@ -85,9 +87,13 @@ def _calmed_if_it_gains(n, contact, before, w, solved, free, R, h, scratch):
 
 @if_law((LAW_STIFFNESS,), _calmed_if_it_gains)
 def limit_stage_energy(n, contact, before, w, solved, free, R, h, scratch):
-    """Result of `solve_contacts` for `free` (v, L), or of dissipative targets if that raises the energy.
+    """Solve the contacts of a resting stage again, with dissipative targets, if their impulses create energy.
 
-    If even dissipative targets raise it, because no method solved them, the impulses are shortened until they do not.
-    Springs may give back the energy that they store.
+    `solved` is the result of `solve_contacts` for `free`, the (v, L) with loads and without impulses; it is returned,
+    or the new result. `before` and w are velocity and angular velocity before the stage. If no method solves the
+    contacts with dissipative targets either, their impulses are shortened until they create no energy.
+
+    This function itself is for compliant contact, where springs may give back energy that they store, and returns
+    `solved`. The decorator replaces it by `_calmed_if_it_gains` in scenes with rigid contact.
     """
     return solved

@@ -1,13 +1,14 @@
-"""Time stepping, one body at walls: a step of every world as a list of stages.
+"""Time stepping of bodies that meet walls only: advance each body of each world by steps, substeps and stages.
 
-Each substep goes through these stages until its time is used up. y = (x, q, v, L) is the state, M its mass and inertia,
-f the load, J the Jacobian of the contacts, u = J (v, ω) their velocities, p their impulses.
+A substep consists of stages: an impact ends a stage, and the next one begins. Each stage has the parts 1 to 6 below,
+and part 7 ends a substep. y = (x, q, v, L) is the state, M its mass and inertia, f the load, J the Jacobian of the
+contacts, u = J (v, ω) their velocities, p their impulses.
 
 1. Hold loads         f = f(y), held over the stage                                        `held_loads.hold_loads`
 2. Find contacts      {i : g_i(x, q) <= slop}, g_i the gap of a feature to a wall          `find_contact_set`
 3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
-4. Limit the stage    to the first t at which a gap g(t) is used up: stage 5 is tried,     `advance_to_impact`
-                      and tried again for a shorter time if something has passed a wall
+4. Limit the stage    to the first t at which a gap g(t) closes: part 5 is tried, and      `advance_to_impact`
+                      tried again for a shorter time if a feature has passed a wall
 5. Integrate          in the air the exact flow of ẋ = v, q̇ = ½ ω q, M v̇ = f              `fly_stage`
                       in contact Moreau's midpoint step: x, q drift by h/2;                `midpoint_step`
                       M Δ(v, ω) = h f + Jᵀ p, u_n >= target ⟂ p_n >= 0, |p_t| <= μ p_n;
@@ -15,13 +16,14 @@ f the load, J the Jacobian of the contacts, u = J (v, ω) their velocities, p th
 6. Correct positions  x moves along a normal where a feature is deeper than the slop       `keep_out_of_walls`
 7. Sleep              a body whose motion stays below a threshold is left out              `falls_asleep`
 
-Stage 4 cuts the substep where a feature meets a wall, so that impulses act where and when bodies meet. This cut, the
-target velocity of stage 5 at the end of the step (`target_velocity.set_resting_targets`) and friction against the mean
-slip of few contacts (`midpoint_friction`) make the scheme second order between impacts and exact on parabolas.
+Part 4 cuts the substep where a feature meets a wall, so that impulses act where and when bodies meet. Three things make
+the scheme second order between impacts, and exact on parabolas: this cut, the target velocity of part 5 at the end of
+the stage (`target_velocity.set_resting_targets`), and friction against the mean slip of few contacts
+(`midpoint_friction`).
 
-What a scene does not have arrives as None and is pruned by the compiler (`decorators.kernel`). Kernels that take a
-state and return one are inlined, but for those that a step hardly ever needs (`cold_kernel`): to pass thirteen numbers
-through memory took a quarter of the time of a block at rest.
+Effects that a scene does not have arrive as None, and the compiler removes their code (`decorators.kernel`). Kernels
+that take a state and return one are inlined, except those that a step seldom needs (`cold_kernel`): passing a state's
+thirteen numbers through memory took a quarter of the time of a block at rest.
 
 References
 ----------
@@ -85,32 +87,32 @@ from physics.kernels.time_stepping.impact import resolve_impacts
 from physics.kernels.time_stepping.midpoint_step import midpoint_step
 from physics.kernels.time_stepping.warm_start import add_to_warm_start, store_warm_start
 
-# Trials of one time of impact: a secant, then parabolas through the last three. Three are usual.
+# Largest number of trials for one time of impact: a secant, then parabolas through the last three gaps (usually three).
 IMPACT_TRIALS = 16
 
 
 @inlined
 def has_touched(memory, i):
-    """True if a body had contacts in its last stage, so that its bounding sphere touches a wall, or just left it."""
+    """True if the body in row i of the contact memory had contacts in its last stage, so that it is near a wall."""
     return memory[i, WALL_MEMORY_COUNT] > 0.0
 
 
 @inlined
 def forget_contacts(memory, i, contacts):
-    """Clear the contact memory of a body in the air."""
+    """Clear row i of the contact memory, of a body that is in flight."""
     if has_touched(memory, i):
         store_warm_start(0, 0, memory, i, 0.0, contacts)
 
 
 @inlined
 def fly_stage(y, h, flight, body):
-    """Free motion over h under the held loads, cut into parts if they are stiff."""
+    """State after a flight of h [s] from y under the held loads; stiff force fields cut the flight into parts."""
     return subdivide_stiff_flight(integrate_flight(y, h, flight, body), y, h, flight, body)
 
 
 @inlined
 def advance_stage(n, y, h, contact, flight, records, scratch):
-    """One stage of length h: flight when nothing touches, else Moreau's step."""
+    """State after one stage of length h [s] from y: a flight if n = 0, else Moreau's midpoint step with n contacts."""
     body = scratch.body
     if n > 0:
         hold_contact_loads(y, h, flight.gyroscopic, flight.offset_frame, body)
@@ -128,13 +130,16 @@ def advance_stage(n, y, h, contact, flight, records, scratch):
 
 @inlined
 def outside_gap(y, offset_frame, scratch):
-    """Smallest gap outside the contact set [m], and the slot of its feature."""
+    """Smallest gap of all features outside the contact set in the state y [m], and that feature's contact slot."""
     return nearest_outside_set(y[0], to_matrix(y[1]), offset_frame, scratch)
 
 
 @inlined
 def find_contact_set(y, h, offset_frame, memory, scratch):
-    """Gather the contact set at y for a stage of length h: (count, depth)."""
+    """Write the contact set in the state y, for a stage of length h [s], into `scratch.contacts`: (count, depth).
+
+    `depth` is the deepest penetration among the contacts [m].
+    """
     return collect_wall_contacts(
         y, angular_velocity(y[1], y[3], scratch.body, offset_frame), h, offset_frame, memory, scratch
     )
@@ -148,7 +153,7 @@ def has_same_pose(y, z):
 
 @cold_kernel
 def keep_out_of_walls(y, offset_frame, scratch):
-    """State y, pushed out of walls where it is deeper than the slop, as bodies that turn by radians may be."""
+    """State y, moved out of walls where the body is deeper than the slop, as after turns by radians."""
     return lift_conserving_energy(
         project_out_of_walls(y[0], to_matrix(y[1]), offset_frame, scratch), y, offset_frame, scratch.body
     )
@@ -156,13 +161,13 @@ def keep_out_of_walls(y, offset_frame, scratch):
 
 @cold_kernel
 def shorten_to_impact(n, y, end, h, contact, flight, records, scratch):
-    """Shorten a stage over h to its first impact if a feature is through a wall at `end`: (state, time advanced).
+    """Shorten a stage from y, of length h and with the state `end`, to its first impact: (state, time advanced).
 
-    The stage is shortened until the feature is within half a slop of the wall, by `parabolic_root` of its gap. If
-    another feature is through the wall by then, the search continues with that one. The gap of one feature is smooth.
-    The smallest gap of all has kinks, near which a parabola would creep along a wall that nothing hits. Impulses that
-    no method solves may leap from one time to the next. Then there is no state between, and the last one outside the
-    wall is taken.
+    At `end` a feature has passed through a wall. The stage is made again and again, for a shorter time from
+    `parabolic_root` of this feature's gap, until the feature is within half a slop of the wall. If another feature is
+    through a wall by then, the search continues with that one. The gap of a single feature is smooth in time. The
+    smallest gap of all features has kinks, which would mislead the search. Where no method solves the contacts, their
+    impulses may jump between two times. Then no state has the feature at the wall, and the last one outside is taken.
     """
     t, low, low_gap, high, high_gap, bend, slot = h, 0.0, 0.0, h, 0.0, 0.0, -1
     low_end = y
@@ -195,10 +200,11 @@ def shorten_to_impact(n, y, end, h, contact, flight, records, scratch):
 
 @inlined
 def advance_to_impact(n, y, h, contact, flight, records, scratch):
-    """Advance by h, or to the first impact within h: (state, time advanced, whether it may be deep in a wall).
+    """Advance the state y by a stage of length h, or to the first impact within h: (state, time advanced, is_deep).
 
-    An end state in which a feature outside the contact set has passed through a wall is taken back, and the stage
-    shortened (`shorten_to_impact`: apart, so that what is hardly ever needed takes no part in what always is).
+    `is_deep` is true if the body may be deeper than the slop in a wall. If a feature outside the contact set has passed
+    through a wall at the end, the stage is made again for a shorter time (`shorten_to_impact`, a separate kernel
+    because it is seldom needed).
     """
     end = advance_stage(n, y, h, contact, flight, records, scratch)
     if has_same_pose(end, y):
@@ -212,11 +218,12 @@ def advance_to_impact(n, y, h, contact, flight, records, scratch):
 
 @inlined
 def substep(y, start, h, contact, flight, records, scratch):
-    """State after h, `start` after the call [s]: impacts at their times, flight or contact between them.
+    """State after a substep of h [s] from y: impacts at their times, and flight or contact stages between them.
 
-    When a substep has used up its cuts, the rest of it is one plastic stage, with contacts wherever it would pass a
-    wall. Cuts for bodies that turn far (`half_space.conservative_advancement`) are counted apart. When those are used
-    up, a body that turns far is treated as one that turns little.
+    The substep begins `start` [s] after the start of the call. When it has used up its cuts at impacts, the rest of it
+    is one plastic stage, with contacts wherever the body would pass a wall. Cuts for bodies that turn far
+    (`half_space.conservative_advancement`) are counted apart. When these are used up, a body that turns far is treated
+    like one that turns little.
     """
     body, stage = scratch.body, scratch.stage
     left, splits, cuts = h, 0, 0
@@ -261,7 +268,10 @@ def substep(y, start, h, contact, flight, records, scratch):
 
 @if_given("contact.acts", 0)
 def _clear_substeps(y, clear, h, left, contact, memory, scratch):
-    """Number of substeps, of those `left`, without contact with a wall; `clear` if that is known."""
+    """Number of the next substeps in which the body cannot meet a wall, at most `left`; 0 if it may in the next one.
+
+    `clear` is the number found before, less the substeps since; it is returned as long as it is positive.
+    """
     if clear > 0 or has_touched(memory, scratch.body.i):
         return clear
     clear = count_clear_substeps(y[0], y[2], h, left, scratch)
@@ -276,7 +286,10 @@ def _fly_substep(y, start, h, clear, contact, flight, records, scratch):
 
 @if_given("contact.acts", _fly_substep)
 def _take_substep(y, start, h, clear, contact, flight, records, scratch):
-    """State after a substep that begins at the time `start` of the step."""
+    """State after a substep of h [s] from y, which begins `start` [s] after the start of the call.
+
+    If `clear` is positive, the body cannot meet a wall in the substep, and flies.
+    """
     if clear == 0:
         return substep(y, start, h, contact, flight, records, scratch)
     return fly_stage(y, h, flight, scratch.body)
@@ -284,12 +297,12 @@ def _take_substep(y, start, h, clear, contact, flight, records, scratch):
 
 @inlined
 def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, scratch):
-    """Advance each body of a world by `grid.steps` steps.
+    """Advance each body of a world by `grid.steps` steps; write its state, and the world's report and events.
 
-    A body in flight looks for walls only when it could be near one (`count_clear_substeps`); one that touched a wall is
-    near it. A body that sleeps is left out (`sleep`, None where the scene does not declare it). A body whose new state
-    is not finite keeps the old one, and its world's report counts the fault. Impacts go to `records.log`, if that has
-    any room, their number to `records.counts`.
+    Walls are only tested for bodies that could be near one (`count_clear_substeps`), or have just touched one. Sleeping
+    bodies are left out; `sleep` is None where the scene does not declare sleep. A body whose new state is not finite
+    keeps the old one, and the report counts a fault. Impacts go to `records.log`, if it has room for events, and their
+    number to `records.counts`. The groups of arguments are those of `physics.kernels.state.groups`.
     """
     body = scratch.body
     h, count, end = grid.h, bodies.shapes.shape[0], grid.steps * grid.substeps
@@ -331,5 +344,8 @@ _advance_worlds = for_each_world(advance_world)
 
 @kernel
 def step_worlds(queue, grid, bodies, contact, restitution, flight, sleep, records, scratch):
-    """Advance the worlds that no other thread has taken, of bodies that meet walls only: `advance_world`."""
+    """Advance all worlds that the calling thread can take from `queue`, whose bodies meet walls only (`advance_world`).
+
+    `scratch` is the thread's workspace, an array of one record.
+    """
     _advance_worlds(queue, (grid, bodies, contact, restitution, flight, sleep, records, scratch[0]))

@@ -1,6 +1,6 @@
-"""Tangential restitution of round bodies: a target of the impact.
+"""Tangential restitution of round bodies, as a tangential target velocity of an impact.
 
-The point of contact leaves with -e_t times its tangential velocity, as far as Coulomb's cone lets it.
+The contact point leaves with -e_t times its tangential velocity, as far as Coulomb's friction cone allows.
 
 References
 ----------
@@ -20,7 +20,7 @@ from physics.kernels.state.contact_law_dispatch import LAW_TANGENTIAL, if_law, l
 from physics.kernels.state.layout import WALL_TANGENT_1, WALL_TANGENT_2
 from physics.kernels.time_stepping.rolling_friction import _as_solved
 
-# Share by which rounding may let the energy of an impact grow.
+# Share by which rounding may raise the energy in an impact.
 _IMPACT_GAIN_ROUNDING = 1.0e-12
 
 
@@ -33,7 +33,7 @@ def _no_aim(*arguments):
 
 @inlined
 def set_tangential_target(k, y, offset_frame, scratch):
-    """Target along the wall of contact k, from the velocity of its point."""
+    """Set the tangential target of contact k to -e_t times the tangential velocity of its point, in the state y."""
     scene, contacts = scratch.scene, scratch.contacts
     _, q, v, L = y
     w = angular_velocity(q, L, scratch.body, offset_frame)
@@ -46,7 +46,11 @@ def set_tangential_target(k, y, offset_frame, scratch):
 
 @if_law((LAW_TANGENTIAL,), _no_aim)
 def set_tangential_targets(n, bounce_speed, y, offset_frame, scratch):
-    """Set targets along the wall of the single bouncing contact; with several, friction alone acts along them."""
+    """Set the tangential target of the contact that bounces, if exactly one of the n contacts does.
+
+    A contact bounces if it approaches faster than `bounce_speed` [m/s]. With several bouncing contacts, friction alone
+    acts along their walls.
+    """
     bouncing, found = 0, 0
     for i in range(n):
         if -scratch.contacts.speed[i] > bounce_speed:
@@ -57,16 +61,18 @@ def set_tangential_targets(n, bounce_speed, y, offset_frame, scratch):
 
 @inlined
 def _energy(v, L, R, body):
-    """Kinetic energy [J]."""
+    """Kinetic energy of a body with velocity v and angular momentum L [J]; R is the matrix of its principal axes."""
     return 0.5 * (body.mass * qt.dot(v, v) + qt.dot(L, apply_inv_inertia(R, L, body.J)))
 
 
 @if_law((LAW_TANGENTIAL,), _as_solved)
 def reject_energy_gain(n, contact, v, L, solved, R, scratch):
-    """Result of `solve_contacts` for v and L, or the one without `set_tangential_targets` if that has gained energy.
+    """Solve an impact again, without tangential targets, if its n contacts have created energy.
 
-    A sphere's only contact cannot gain energy, since its motions along and across the wall do not mix. A contact of a
-    sphere that also rests on another wall can, because the coefficients differ.
+    v and L are velocity and angular momentum before the impact, and `solved` is the result of `solve_contacts` for
+    them; it is returned, or the new result. The only contact of a sphere cannot create energy, since its motions along
+    and across the wall are independent. If the sphere also rests on another wall, the impact can, because the
+    coefficients of the two contacts differ.
     """
     contacts = scratch.contacts
     if n == 1 or not _energy(solved[0], solved[1], R, scratch.body) > (1.0 + _IMPACT_GAIN_ROUNDING) * _energy(

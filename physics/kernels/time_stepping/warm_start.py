@@ -1,4 +1,8 @@
-"""Warm start of the contact problem: impulses of the last resting stage of a body, by slot."""
+"""Warm start of the contact problem: store the impulses of a body's resting stage, and load them in the next one.
+
+Impulses are stored by contact slot, in the row of the body in `memory` (`persistent_contacts`). `width` is the number
+of impulses per contact, 1 without friction and 3 with it.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,13 @@ from physics.kernels.half_space.persistent_contacts import WALL_MEMORY_COUNT, WA
 
 
 def wall_memory_size(slots: int) -> int:
-    """Columns of `memory` for bodies with `slots` possible contacts."""
+    """Number of columns of `memory` for bodies with `slots` possible contacts at walls."""
     return WALL_MEMORY_HEAD + 4 * slots
 
 
 @inlined
 def load_warm_start(n, width, memory, i, h, contacts):
-    """Load impulses of the last resting stage, by slot, scaled to a stage of length h."""
+    """Load the impulses of the last resting stage of body i into `contacts.impulse`, scaled to a stage of length h."""
     first = WALL_MEMORY_HEAD + contacts.slot.shape[0]
     scale = 0.0
     if memory[i, WALL_MEMORY_STAGE] > 0.0:
@@ -26,7 +30,7 @@ def load_warm_start(n, width, memory, i, h, contacts):
 
 @inlined
 def _are_kept(n, memory, i, contacts):
-    """True if the contacts of the last resting stage are those of this one, in the same order."""
+    """True if the last resting stage of body i had the same n contacts as this one, in the same order."""
     if memory[i, WALL_MEMORY_COUNT] != n:
         return False
     for k in range(n):
@@ -37,7 +41,7 @@ def _are_kept(n, memory, i, contacts):
 
 @kernel
 def _keep_slots(n, memory, i, contacts):
-    """Replace the contacts of the last resting stage by those of this one, with zero impulses."""
+    """Replace the contacts in the memory of body i by the n contacts of this stage, with zero impulses."""
     first = WALL_MEMORY_HEAD + contacts.slot.shape[0]
     for k in range(int(memory[i, WALL_MEMORY_COUNT])):
         base = first + 3 * int(memory[i, WALL_MEMORY_HEAD + k])
@@ -50,7 +54,7 @@ def _keep_slots(n, memory, i, contacts):
 
 @inlined
 def store_warm_start(n, width, memory, i, h, contacts):
-    """Keep the impulses of this resting stage by slot, and drop those of contacts that have ended."""
+    """Store the impulses of the n contacts of a resting stage of length h of body i; forget contacts that ended."""
     first = WALL_MEMORY_HEAD + contacts.slot.shape[0]
     memory[i, WALL_MEMORY_STAGE] = h
     if not _are_kept(n, memory, i, contacts):
@@ -63,7 +67,10 @@ def store_warm_start(n, width, memory, i, h, contacts):
 
 @cold_kernel
 def add_to_warm_start(n, width, memory, scratch):
-    """Add the impulses in `contacts.rebound` to those of the same contacts in the resting stage, which forces read."""
+    """Add the impulses in `contacts.rebound` to the stored impulses of the same n contacts.
+
+    They come from `resolve_impacts` and belong to the contact forces of the stage, which users read from `memory`.
+    """
     contacts = scratch.contacts
     first = WALL_MEMORY_HEAD + contacts.slot.shape[0]
     for k in range(n):

@@ -1,10 +1,11 @@
-"""Scratch memory of one thread: one body and its contacts during a step.
+"""Workspace of one thread, `scratch`: the numbers of one body, and of its contacts with walls, during a step.
 
-It is one NumPy record, so that a kernel hands on a single pointer, and the compiler knows every size. It is
-filled anew for each body (`body.bind_body`); nothing in it outlives a step.
+The workspace is one NumPy record, so that kernels pass on a single pointer, and the compiler knows every size. It is
+filled anew for each body (`body.bind_body`), and no step leaves numbers in it for the next.
 
-Contacts here are with walls: arm and Jacobian rows belong to the body. The wall has inverse mass and inertia zero as
-in the course notes, and adds nothing. Bodies that touch each other have their own memory (`multibody.data.arrays`).
+Contacts are with walls, so arms and Jacobian rows are those of the body. A wall has zero inverse mass and inverse
+inertia, as in the course notes, and adds nothing. Bodies that touch each other have a memory of their own
+(`multibody.data.arrays`).
 """
 
 from __future__ import annotations
@@ -19,24 +20,27 @@ from physics.kernels.time_stepping.midpoint_friction import MEAN_SLIP_CONTACTS
 
 
 def setting_fields() -> list[tuple]:
-    """Fields of the numerical settings."""
+    """Fields, in the form of `numpy.dtype`, of the numerical settings in a workspace."""
     f, i = np.float64, np.int64
     return [
         ("tolerance", f),  # largest residual of a contact solve, relative to the largest free contact speed
         ("sweeps", i),  # sweeps per solve at most
         ("splits", i),  # cuts of a substep at impacts at most
-        ("mean_slip", i),  # contacts of a stage up to which friction opposes their mean slip (`midpoint_friction`)
+        ("mean_slip", i),  # most contacts of a stage with friction against their mean slip (`midpoint_friction`)
         ("rest_share", f),  # a rebound that would be over within this share of the substep is plastic
     ]
 
 
 def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> list[tuple]:
-    """Fields for the numbers of one body from `body.bind_body`, and from the scene's fields and laws."""
+    """Fields, in the form of `numpy.dtype`, of a body's record: its parameters and loads (`body.bind_body`).
+
+    `terms` are the scene's force fields, `laws` its contact laws; they add members.
+    """
     f, i = np.float64, np.int64
     return [
-        *term_members(terms),  # first: a record may stand for one that it begins with, and Numba would say so
+        *term_members(terms),  # first: Numba takes a record for another one whose fields are the first of its own
         *contact_laws.law_members(laws),
-        ("relative_slop", f),  # gap within which a feature touches, in bounding radii; the one field that is read
+        ("relative_slop", f),  # gap within which a feature touches, in bounding radii; `bind_body` only reads this one
         ("i", i),
         ("world", i),
         ("shape", i),
@@ -57,28 +61,31 @@ def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> lis
 
 
 def _scene_fields(wall_count: int) -> list[tuple]:
-    """Fields of the walls, and of the features that meet them."""
+    """Fields, in the form of `numpy.dtype`, of the walls, and of the number of features of a body."""
     f, i = np.float64, np.int64
     return [
-        ("features", i),
-        ("feature_bits", i),  # log2 of it
+        ("features", i),  # contact features of a body, 8 or 1
+        ("feature_bits", i),  # log2(features)
         ("walls", f, (max(wall_count, 1), WALL_SIZE)),  # columns of `layout`
     ]
 
 
 def _stage_fields() -> list[tuple]:
-    """Fields that one stage, or one solve, hands to the next."""
+    """Fields, in the form of `numpy.dtype`, that one stage, or one solve, leaves for the next."""
     f, i = np.float64, np.int64
     return [
         ("mode", i),  # the direct solve to try first, then the one that solved it (`sliding_patch.TRY_STICKING` ...)
         ("residual_limit", f),  # residual allowed beside the tolerance [m/s]: see `midpoint_step.rest_residual`
-        ("target_error_limit", f),  # by what the targets of contacts that hold may be off [m/s]: see `sticking`
-        ("is_last", i),  # 1 in the last stage a substep may have: take in all that would pass through a wall
+        ("target_error_limit", f),  # allowed error of the targets of sticking contacts [m/s]: see `sticking`
+        ("is_last", i),  # 1 in the last stage a substep may have: the set has all features that would pass a wall
     ]
 
 
 def _contact_fields(walls: int, n: int, laws: tuple[str, ...]) -> list[tuple]:
-    """Fields of up to n contacts: their set, the problem that it poses, and last the outputs of a solve."""
+    """Fields, in the form of `numpy.dtype`, of up to n contacts: contact set, contact problem, results of a solve.
+
+    `walls` is the number of walls, `laws` are the scene's contact laws.
+    """
     f, i = np.float64, np.int64
     contact_set = [
         ("mask", i, (walls,)),  # bit k: feature k of the body is in the contact set of this wall
@@ -110,11 +117,11 @@ def _contact_fields(walls: int, n: int, laws: tuple[str, ...]) -> list[tuple]:
 
 
 def _solver_fields(n: int) -> list[tuple]:
-    """Fields in which the solvers of n contacts keep numbers of their own: no other kernel reads them."""
+    """Fields, in the form of `numpy.dtype`, of the contact solvers' own numbers for n contacts."""
     float_size, int_size = np.maximum(pyramid_sizes(n), normal_lcp_sizes(n)).tolist()
     f, i = np.float64, np.int64
     return [
-        ("saved", f, (3 * n,)),  # p of the sweeps while the fallback tries [N s]
+        ("saved", f, (3 * n,)),  # impulses of the sweeps, kept while the fallback tries [N s]
         ("change", f, (3 * n,)),  # of p in the last sweep [N s]
         ("active", i, (n,)),  # of a direct solve: contacts that push, flags (`sticking`) or a list (`sliding_patch`)
         ("normal", f, (n,)),  # of a direct solve: normal impulse, negative where the contact is open [N s]
@@ -133,7 +140,10 @@ def _solver_fields(n: int) -> list[tuple]:
 def workspace_dtype(
     wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
 ) -> np.dtype:
-    """Record type for bodies with `features` contact features each on `wall_count` walls, with fields and laws."""
+    """Record type of a workspace for bodies with `features` contact features (8 or 1) at `wall_count` walls.
+
+    `terms` are the scene's force fields, `laws` its contact laws.
+    """
     n = max(wall_count * features, 1)
     groups = {
         "settings": setting_fields(),
@@ -149,7 +159,10 @@ def workspace_dtype(
 def make_workspace(
     walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), **settings: float
 ) -> np.ndarray:
-    """One workspace record, shape (1,), for `walls` ((walls, WALL_SIZE)), fields, laws, and numerical settings."""
+    """Make a workspace, an array of one record, for the given walls (walls, WALL_SIZE), features, fields and laws.
+
+    `settings` are numbers of `setting_fields`, or of a body's record such as `relative_slop`.
+    """
     scratch = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
     scene = scratch["scene"]
     scene["features"], scene["feature_bits"] = features, features.bit_length() - 1
@@ -162,7 +175,7 @@ def make_workspace(
 
 
 def body_records(scratch) -> np.ndarray:
-    """Records of `body_fields` in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
+    """Records of bodies (`body_fields`) in a workspace, in a `LinkedWorld`, or in a `BodiesWorkspace`."""
     if isinstance(scratch, np.ndarray):
         return scratch["body"]
     return getattr(scratch, "bodies", scratch).body
