@@ -15,6 +15,7 @@ NEAREST, FARTHEST = 1.0, 4.0  # distance of the mark at the start [m]
 FRICTION = (0.15, 0.4)
 TOLERANCE = 0.1  # distance from the mark at rest that is a success [m]
 AT_REST = 1e-3  # speed below which the stone has stopped [m/s]
+HIT = 1.0  # what a hit earns
 EFFORT_PRICE = 0.1  # of the integral of (force over weight)² [1/s]
 LENGTH, SPEED = 5.0, 5.0  # units of the observation [m], [m/s]
 HALVINGS = 50  # of the interval in which the slide's duration is sought: 2^-50 of 10 s
@@ -82,12 +83,19 @@ def best_return(goal, friction, duration):
     """Largest return of an episode whose mark is at `goal` (n, 2), with `friction` (n,), pushed for `duration` [s]."""
     distance = np.linalg.norm(goal, axis=1)
     _, effort = best_push(distance, np.zeros_like(distance), friction, np.full_like(distance, duration))
-    return 1.0 - EFFORT_PRICE * effort
+    return distance + HIT - EFFORT_PRICE * effort
 
 
 def mark_offset(worlds):
     """Mark minus centre, x and z, (n, 2) [m]."""
     return worlds.drawn["goal"] - worlds.pos[:, 0, ::2]
+
+
+def miss_offset(worlds):
+    """Mark minus the place where a stone that slides alone would stop, x and z, (n, 2) [m]."""
+    velocity = worlds.linvel[:, 0, ::2]
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    return mark_offset(worlds) - velocity * speed / (2.0 * G * worlds.drawn["friction"][:, None])
 
 
 class BlockCurl(Task):
@@ -101,9 +109,9 @@ class BlockCurl(Task):
 
     ## Rewards
 
-    `miss`: minus the distance from the mark [m], once the stone has stopped. `effort`: minus 0.1 times the integral of
-    the squared force over the weight. `success`: 1 for a hit. The largest return is that of `best_return`: a hit with
-    the least effort, for a force that changes freely in time.
+    `nearer`: the gain of minus the miss [m], the distance from the mark at which the stone would stop if the agent let
+    it go now. `effort`: minus 0.1 times the integral of the squared force over the weight. `success`: 1 for a hit. The
+    largest return is that of `best_return`: a hit with the least effort, for a force that changes freely in time.
 
     ## Starting State
 
@@ -112,8 +120,8 @@ class BlockCurl(Task):
     ## Episode End
 
     Once the stone has stopped after the push: success within 0.1 m of the mark, else failure. Truncation after 200
-    control steps (5 s). `info` holds `distance` [m], and `regret`: the largest return less the return so far; it is
-    complete when the episode ends.
+    control steps (5 s). `info` holds `distance` and `miss` [m], and `regret`: the largest return less the return so
+    far; it is complete when the episode ends.
 
     ## Version History
 
@@ -133,22 +141,32 @@ class BlockCurl(Task):
         Entry("share of the push that is left", "1", 0, 1, lambda w: np.maximum(1.0 - w.steps / PUSHED, 0.0)),
     ]
     draws = {"goal": Ring(), "friction": FRICTION}
-    memory = {"effort": 1}
+    memory = {"effort": 1, "miss": 1}
     max_episode_steps = 200
 
     def measure(self, worlds):
-        """Distance from the mark, and what the agent has lost against the best push so far."""
+        """Distance and miss, and what the agent has lost against the best push so far."""
         goal, friction = worlds.drawn["goal"], worlds.drawn["friction"]
-        distance = np.linalg.norm(mark_offset(worlds), axis=1)
-        gained = np.where(self._has_stopped(worlds), (distance < TOLERANCE) - distance, 0.0)
-        best = best_return(goal, friction, PUSHED * self.control_dt)
-        return {"distance": distance, "regret": best + EFFORT_PRICE * worlds.memory["effort"] - gained}
+        distance, miss = (np.linalg.norm(part, axis=1) for part in (mark_offset(worlds), miss_offset(worlds)))
+        hit = np.where(self._has_stopped(worlds) & (distance < TOLERANCE), HIT, 0.0)
+        gained = np.linalg.norm(goal, axis=1) - miss + hit - EFFORT_PRICE * worlds.memory["effort"]
+        return {
+            "distance": distance, "miss": miss,
+            "regret": best_return(goal, friction, PUSHED * self.control_dt) - gained,
+        }  # fmt: skip
+
+    def begin(self, worlds):
+        """Remember the miss of a stone that is not pushed."""
+        worlds.memory["miss"][:] = worlds.measured["miss"]
 
     def update(self, worlds):
         """Add the effort of this step, and take the push away once its time is over."""
-        force = worlds.wrench[:, 0, :3] / worlds.weight[:, :1]
-        worlds.memory["effort"] += self.control_dt * (force**2).sum(axis=1)
+        worlds.memory["effort"] += self._effort(worlds)
         self.limits[worlds.indices[worlds.steps >= PUSHED]] = 0.0
+
+    def _effort(self, worlds):
+        """Integral of the squared force over the weight in the last control step (n,) [s]."""
+        return self.control_dt * ((worlds.wrench[:, 0, :3] / worlds.weight[:, :1]) ** 2).sum(axis=1)
 
     def _has_stopped(self, worlds):
         """(n,) bool: after the push, at rest."""
@@ -163,13 +181,11 @@ class BlockCurl(Task):
         return self._has_stopped(worlds) & (worlds.measured["distance"] >= TOLERANCE)
 
     def rewards(self, worlds):
-        """A hit less its effort, or minus the distance."""
-        effort = self.control_dt * ((worlds.wrench[:, 0, :3] / worlds.weight[:, :1]) ** 2).sum(axis=1)
-        return {
-            "miss": np.where(self._has_stopped(worlds), -worlds.measured["distance"], 0.0),
-            "effort": -EFFORT_PRICE * effort,
-            "success": 1.0 * worlds.success,
-        }
+        """Gain towards the mark, effort and hit."""
+        before, now = worlds.memory["miss"], worlds.measured["miss"]
+        nearer = before - now
+        before[:] = now
+        return {"nearer": nearer, "effort": -EFFORT_PRICE * self._effort(worlds), "success": HIT * worlds.success}
 
     def goal_mark(self, world):
         """A disc of the tolerance."""

@@ -79,7 +79,7 @@ def test_regret_is_never_negative_and_small_for_the_best_push():
     assert not np.isnan(regrets).any()
     assert (regrets >= 0.0).all()
     assert regrets.max() < 5e-3
-    assert ((best > 0.8) & (best < 1.0)).all()  # return and regret add up to the largest return
+    assert ((best > 1.0) & (best < 5.0)).all()  # return and regret add up to the largest return
 
 
 def test_the_agent_cannot_act_once_the_push_is_over():
