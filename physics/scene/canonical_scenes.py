@@ -1,4 +1,7 @@
-"""The canonical scenes: used by tests, benchmarks, environments and demonstrations alike."""
+"""Canonical scenes, which tests, benchmarks, environments and demonstrations share.
+
+"The block" of a docstring is always the block of the exercise, 5 x 3 x 2 m and 6 kg, unless it says otherwise.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,19 @@ def block_in_box(
     walls: Layout = "three",
     **start: Any,
 ) -> Scene:
-    """Make the block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
+    """Make a scene with gravity and the block of `SIZE` [m] and `MASS` [kg] among three walls.
+
+    Parameters
+    ----------
+    pos : (3,) array_like
+        Centre of mass at the start, world frame [m].
+    restitution, friction : float or None
+        Coefficients e and μ. None: plastic impacts, and no friction.
+    walls : str
+        ``three`` for `three_walls`, ``corner`` for `corner`.
+    **start
+        `quat`, `linvel` and `angvel` of the block, as of `Block`.
+    """
     layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
     if walls not in layouts:
         raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
@@ -39,7 +54,7 @@ def block_in_box(
 
 
 def drop() -> Scene:
-    """The exercise: the block, slightly turned and spinning, falls into the three-wall box."""
+    """The exercise: the block, slightly turned and spinning, falls into the box of three walls."""
     tilt = 0.25  # [rad] about (1, 1, 0)
     s = math.sin(tilt / 2) / math.sqrt(2)
     return block_in_box((0.0, 6.0, 0.0), quat=(math.cos(tilt / 2), s, s, 0.0), angvel=(0.3, 0.2, 0.1))
@@ -92,20 +107,20 @@ def incline(angle: float, friction: float) -> Scene:
 def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
     """The block dropped face down, elastic and without friction.
 
-    The `height` [m] is that of its lowest face above the floor.
+    The lowest face starts at `height` [m] above the floor.
     """
     body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2 + height, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(restitution)])
 
 
 def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
-    """A sphere of radius 1 m and 1 kg set down sliding: it ends rolling at 5/7 of its speed."""
+    """A sphere of radius 1 m and 1 kg slides over the floor at `speed` [m/s] until it rolls, at 5/7 of that speed."""
     body = Sphere(1.0, 1.0, pos=(0.0, 1.0, 0.0), linvel=(speed, 0.0, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 
 
 def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
-    """The block dropped on a vertex from 1 m: turned by 0.7 rad about (1, 1, 0), at rest at first."""
+    """The block, turned by 0.7 rad about (1, 1, 0), dropped from rest with its lowest vertex 1 m above the floor."""
     half, clearance = 0.5 * 0.7, 1.0
     s = math.sin(half) / math.sqrt(2)
     # Height of the centre above the lowest vertex: Σ a_i |y·e_i|, the second row of the rotation matrix.
@@ -129,7 +144,7 @@ def closed_box(half: float = 5.0) -> Scene:
 def tower(count: int = 10, top: float = 1.0) -> Scene:
     """Unit cubes of 1 kg standing on each other on an endless floor.
 
-    The top one has the mass `top` [kg].
+    There are `count` cubes; the top one has the mass `top` [kg].
     """
     masses = [1.0] * (count - 1) + [top]
     bodies = [Block((1.0, 1.0, 1.0), mass, pos=(0.0, k + 0.5, 0.0)) for k, mass in enumerate(masses)]
@@ -137,9 +152,12 @@ def tower(count: int = 10, top: float = 1.0) -> Scene:
 
 
 def heap(count: int = 100, seed: int = 1) -> Scene:
-    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m."""
+    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m.
+
+    There are `count` cubes; `seed` decides their attitudes.
+    """
     rng = np.random.default_rng(seed)
-    pitch = 1.75  # of the grid they start from; the diagonal of a cube is 1.732 m
+    pitch = 1.75  # of the grid of starting positions [m]; the diagonal of a cube is 1.732 m
     bodies = []
     for k in range(count):
         q = rng.standard_normal(4)
@@ -153,7 +171,7 @@ def heap(count: int = 100, seed: int = 1) -> Scene:
 def football() -> Scene:
     """The football of the course notes in flight: kicked at 25 m/s, spinning about its long axis and a little off it.
 
-    Gravity exerts no torque on it; drag and lift are those of the air, and the spin wears off slowly.
+    Gravity exerts no torque on it. The air exerts drag and lift, and slowly brakes the spin.
     """
     launch, spin = 0.6, 50.0  # [rad] above the horizon, [rad/s] about the long axis
     c, s = math.cos(launch), math.sin(launch)
@@ -183,12 +201,12 @@ SCENES["incline"] = _steep_incline
 
 
 def about(name: str) -> str:
-    """Description of a canonical scene in one line."""
+    """Describe the canonical scene of this name in one line: the first line of its function's docstring."""
     return (SCENES[name].__doc__ or name).splitlines()[0].rstrip(".")
 
 
 def by_name(name: str) -> Scene:
-    """Canonical scene of this name."""
+    """Make the canonical scene of this name, one of `SCENES`; ValueError for other names."""
     if name not in SCENES:
         raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, sorted(SCENES)))}")
     return SCENES[name]()
