@@ -21,8 +21,8 @@ from physics.scene.bodies import Body
 SHAPES = ("box", "sphere", "ellipsoid", "mesh")
 TURNED = ("box", "ellipsoid")  # shapes whose axes become the body axes in a scene
 
-# MuJoCo finds principal axes by an iteration, older versions to 2e-7. If its tensor agrees with that of the file to this
-# share, the tensor of the file is used.
+# MuJoCo finds principal axes by an iteration, older versions to 2e-7. If its tensor agrees with that of the file to
+# this share, the tensor of the file is used.
 DIAGONALISED = 1e-6
 # MuJoCo keeps the corners of a mesh in single precision. Points of the file that agree with them to this share of the
 # size are used instead.

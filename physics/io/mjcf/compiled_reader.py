@@ -16,7 +16,7 @@ from physics.io.mjcf.text import Element, ModelError
 from physics.io.mjcf.touching import Touching
 from physics.scene.scene import HalfSpace, Scene
 
-# MuJoCo keeps a plane as a rotation. If its normal agrees with that of the file to this share, that of the file is used.
+# MuJoCo keeps a plane as a rotation. If its normal agrees with that of the file to this share, the latter is used.
 ROTATED = 1e-9
 
 
