@@ -85,7 +85,7 @@ class EngineContender:
 
 
 def setting_name(accuracy: Preset | Accuracy) -> str:
-    """Name of an accuracy: a preset's, or that of the nearest preset with the changed fields, ``balanced(substeps=5)``."""
+    """Name of an accuracy: that of a preset, or the nearest preset with changed fields, as ``balanced(substeps=5)``."""
     knobs = resolve(accuracy)
     changes = {
         name: [f.name for f in fields(knobs) if getattr(knobs, f.name) != getattr(preset, f.name)]
