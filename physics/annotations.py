@@ -24,10 +24,10 @@ Preset = Literal["fast", "balanced", "precise", "reference"]
 """Name of a preset of accuracy; see `physics.PRESETS`."""
 
 SchemeName = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
-"""Name of an integration scheme; see `physics.Accuracy`."""
+"""Name of an integration scheme, as `physics.Accuracy` explains them."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-"""Type variable of a function whose signature a decorator keeps."""
+"""Type variable for decorators that return a function of the same signature."""
 
 if TYPE_CHECKING:
 

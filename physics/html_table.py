@@ -17,10 +17,10 @@ import numpy as np
 from physics.summary import LONGEST_VALUE, SCREEN, HasParts, shown
 
 LARGEST = 4096
-"""Largest size of a table [bytes of UTF-8]."""
+"""Largest size of the HTML of a table [bytes of UTF-8]; further rows are left out."""
 
 LONGEST_CELL = SCREEN // 2
-"""Largest length of a text [characters]; longer ones are cut."""
+"""Largest length of the text of a cell [characters]; longer texts are cut."""
 
 _LEFT = 'style="text-align: left"'  # notebooks set cells to the right; colours are the notebook's own
 _END = "</tbody></table>"
@@ -36,6 +36,7 @@ def table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     Parameters
     ----------
     title : str
+        Heading of the table.
     rows : iterable of (str, str)
         Name and value, as plain text: both are escaped here. A row without a name is one wide cell. Texts longer than
         `LONGEST_CELL` are cut. Rows beyond the size `LARGEST` are left out, with three dots in their place.

@@ -42,7 +42,7 @@ class _Short(reprlib.Repr):
         return repr(float(x))
 
     def repr_ndarray(self, x, level):
-        """Numbers of an array, or its shape if it has many."""
+        """Numbers of an array, or its shape if it has more than `MOST_NUMBERS`."""
         if x.size > MOST_NUMBERS:
             return f"an array of shape {x.shape}"
         return repr(x.item()) if x.ndim == 0 else np.array2string(x, precision=6, separator=", ")

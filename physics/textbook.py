@@ -108,7 +108,7 @@ def rk4(scene, Y, contacts, h):
 
 
 def gaps(scene, Y):
-    """Distance of each vertex from each wall [m], (8, walls); negative where it penetrates."""
+    """Distance of each vertex of the block from each wall [m], (8, walls); negative where it penetrates."""
     return (Y[:3] + auxiliary(scene, Y)[0]) @ scene.frames[:, 0].T - [wall.offset for wall in scene.walls]
 
 
@@ -153,7 +153,7 @@ def resting_contact(scene, Y, contacts):
 
 
 def solve_contacts(A, b, mu, slip):
-    """Forces f (3k,) of 0 <= f_n ⟂ a_n >= 0 with a = A f + b, and friction; or impulses, with velocities for a.
+    """Contact forces f (3k,) with 0 <= f_n ⟂ a_n >= 0, a = A f + b, and friction. Velocities for a: impulses.
 
     Where `slip` (k, 2) is a unit vector, f_t = -μ f_n slip. Elsewhere a_t = 0, or f_t = -μ f_n a_t/|a_t|. Lemke's
     method finds forces without friction; from there Newton's method follows them as μ grows, in few steps or in many.

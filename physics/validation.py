@@ -39,7 +39,7 @@ FLOAT64 = np.dtype(np.float64)
 def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
     """Convert `value` to a float64 array; bools, strings, complex numbers, masked values and None are refused.
 
-    The message says "allowed" and then the words `allowed`.
+    The message calls the argument `field` and ends with "allowed" and the words `allowed`.
     """
     array = _real(value)
     if array is None:
@@ -80,7 +80,7 @@ def _is_real(item) -> bool:
 
 
 def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array, which must have exactly this `shape`."""
+    """Convert `value` to a float64 array, which must have exactly this `shape`; an error calls it `field`."""
     array = floats(value, field, f"are numbers in shape {shape}" if shape else "is one number")
     if array.shape != shape:
         allowed = f"shape {shape}" if shape else "one number"
@@ -89,7 +89,7 @@ def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array, which must have exactly this `shape` and finite numbers."""
+    """Convert `value` to a float64 array of exactly this `shape` with finite numbers; an error calls it `field`."""
     array = shaped(value, shape, field)
     if not np.isfinite(array).all():
         raise _not_finite(array, field)
@@ -98,6 +98,8 @@ def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarray:
     """Expand `value` to n numbers for every world and body: a float64 array of `shape` (worlds, bodies, n).
+
+    An error calls the argument `field`.
 
     Allowed are (worlds, bodies, n), and (bodies, n) for all worlds alike. With one body the axis of bodies may be left
     out: (n,) for all worlds alike, (worlds, n) a row for each world. With several bodies two axes are always (bodies,
@@ -127,8 +129,8 @@ def _given(array: np.ndarray) -> str:
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
     """Copy `value` into `target`, a contiguous float64 array (worlds, bodies, n), and check that it is finite.
 
-    `value` may have all shapes that `batch` allows. Copy and check take one pass, since every step makes this call. An
-    error leaves `target` overwritten.
+    `value` may have all shapes that `batch` allows; an error calls it `field`, and leaves `target` overwritten. Copy
+    and check take one pass, since every step makes this call.
     """
     if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
         array = value
@@ -150,7 +152,8 @@ def _not_finite(array: np.ndarray, field: str) -> ValueError:
 def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> ValueError:
     """Make the error about an array in which `good` is False somewhere; of a long array it shows the first such number.
 
-    `good` is a bool array of the same shape. The message says "allowed" and then the words `allowed`.
+    `good` is a bool array of the same shape. The message calls the array `field` and ends with "allowed" and the words
+    `allowed`.
     """
     if array.size <= 9:
         return ValueError(f"{field} is {shown(array)}; allowed {allowed}")
@@ -159,7 +162,7 @@ def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> Value
 
 
 def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
-    """Convert `value` to a finite float64 array (n, `width`) with any number n of rows."""
+    """Convert `value` to a finite float64 array (n, `width`) with any number n of rows; an error calls it `field`."""
     array = floats(value, field, f"are rows of {width} numbers")
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"{field} {_given(array)}; allowed are rows of {width} numbers")
@@ -167,12 +170,12 @@ def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
 
 
 def number(value: ArrayLike, field: str) -> float:
-    """Convert `value` to a float, which must be finite."""
+    """Convert `value` to a float, which must be finite; an error calls it `field`."""
     return float(finite(value, (), field))
 
 
 def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape`; its numbers must be finite and greater than 0."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers above 0; an error calls it `field`."""
     array = finite(value, shape, field)
     if not (array > 0).all():
         raise _bad(array, array > 0, field, "are numbers greater than 0")
@@ -180,7 +183,7 @@ def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray
 
 
 def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape`; its numbers must be finite and at least 0."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers of at least 0; an error calls it `field`."""
     array = finite(value, shape, field)
     if not (array >= 0).all():
         raise _bad(array, array >= 0, field, "are numbers of at least 0")
@@ -188,7 +191,7 @@ def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.nda
 
 
 def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape`; its numbers must be from 0 to 1."""
+    """Convert `value` to a float64 array of this `shape` with numbers from 0 to 1; an error calls it `field`."""
     array = finite(value, shape, field)
     good = (array >= 0) & (array <= 1)
     if not good.all():
@@ -197,7 +200,10 @@ def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> int:
-    """Convert `value` to an int, which must be an integer from `least` to `most`; `most` None sets no upper limit."""
+    """Convert `value` to an int, which must be an integer from `least` to `most`; an error calls it `field`.
+
+    `most` None sets no upper limit.
+    """
     if type(value) is int and least <= value and (most is None or value <= most):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
@@ -208,7 +214,7 @@ def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> in
 
 
 def index(value: int, count: int, field: str) -> int:
-    """Convert `value` to an int, which must be an index from 0 to `count` - 1."""
+    """Convert `value` to an int, which must be an index from 0 to `count` - 1; an error calls it `field`."""
     is_integer = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_integer or not 0 <= value < count:
         raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}")
@@ -218,7 +224,8 @@ def index(value: int, count: int, field: str) -> int:
 def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> str:
     """Return `value`, which must be one of `names`.
 
-    The message lists the names, the nearest first, and appends `besides`, words about further allowed values.
+    The message of an error calls the argument `field` and lists the names, the nearest first. It ends with `besides`,
+    words about further allowed values.
     """
     names = list(names)
     if not isinstance(value, str) or value not in names:
@@ -228,14 +235,17 @@ def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> s
 
 
 def instance(value: object, kind: type, field: str, name: str):
-    """Return `value`, which must be an instance of the class `kind`; the message calls that class `name`."""
+    """Return `value`, which must be an instance of the class `kind`.
+
+    The message of an error calls the argument `field`, and the class `name`.
+    """
     if not isinstance(value, kind):
         raise ValueError(f"{field} is {shown(value)}; allowed is {name}")
     return value
 
 
 def path(value: str | os.PathLike, field: str = "path"):
-    """Return `value`, which must be the path of a file: a str or a `Path`, not empty."""
+    """Return `value`, which must be the path of a file: a str or a `Path`, not empty; an error calls it `field`."""
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
         raise ValueError(f"{field} is {shown(value)}; allowed is the path of a file, a str or a Path")
     return value
@@ -244,7 +254,7 @@ def path(value: str | os.PathLike, field: str = "path"):
 def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
     """Convert `value` to quaternions (w, x, y, z) of this `shape` (..., 4), normalised to rounding.
 
-    Their norms must be 1 within `UNIT_TOLERANCE`.
+    Their norms must be 1 within `UNIT_TOLERANCE`; an error calls the argument `field`.
     """
     array = finite(value, shape, field)
     length = np.linalg.norm(array, axis=-1, keepdims=True)
@@ -260,5 +270,5 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
 
 
 def unit(array: np.ndarray, length: Any) -> np.ndarray:
-    """Divide `array` by its `length`, but keep it as it is if that is 1 to rounding: a second call changes nothing."""
+    """Divide `array` by its `length`; a length of 1 to rounding leaves it unchanged, as a second call would have."""
     return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

@@ -22,7 +22,7 @@ from physics.world.world import World
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Energy, momenta and gaps per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
+    """Energy, momenta and gaps of each body of each world: arrays (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
     potential_energy: np.ndarray  # [J], of gravity (0 at the origin), contact springs, and fields with a potential
@@ -43,7 +43,7 @@ class Diagnostics:
 
     @property
     def energy(self) -> np.ndarray:
-        """Kinetic and potential energy [J], (worlds, bodies)."""
+        """Sum of kinetic and potential energy of each body [J], (worlds, bodies)."""
         return self.kinetic_energy + self.potential_energy
 
 

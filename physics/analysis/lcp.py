@@ -27,7 +27,7 @@ class LcpStatus(IntEnum):
 
     @property
     def message(self) -> str:
-        """Explanation of the status, and advice."""
+        """Explanation of the status in words, and advice."""
         return _MESSAGES[self]
 
 

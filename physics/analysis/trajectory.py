@@ -97,7 +97,7 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """True if the reports of all intervals are OK."""
+        """True if the reports of all intervals between samples are OK (`StepReport.ok`)."""
         return all(report.ok for report in self.reports)
 
     # --- bodies ------------------------------------------------------------------------------------------------
@@ -275,7 +275,7 @@ class BodyTrajectory:
         return self.name or f"body {self.body}"
 
     def plot(self, path: str | Path | None = None):
-        """Draw position, velocity, angular velocity and energy over time; see `Trajectory.plot`."""
+        """Draw position, velocity, angular velocity and energy of the body over time, as `Trajectory.plot` does."""
         return trajectory_plot.plot_body(self, path)
 
 

@@ -16,7 +16,7 @@ else:
     from physics.compiler.interpreted import backend
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-"""Type variable of a function whose signature a decorator keeps."""
+"""Type variable for decorators that return a function of the same signature."""
 
 is_kernel, lend = backend.is_kernel, backend.lend
 

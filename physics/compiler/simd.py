@@ -51,7 +51,7 @@ def _of_each_or_one(of: Callable, *values):
 
 
 def _divided(x, y) -> float:
-    """Quotient as in kernels: infinity or NaN where Python raises an exception."""
+    """Quotient of two numbers as in kernels: infinity or NaN where Python would raise an exception."""
     with np.errstate(all="ignore"):
         return float(np.float64(x) / np.float64(y))
 

@@ -192,7 +192,8 @@ def _area_vectors(corners: np.ndarray) -> np.ndarray:
 def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list[int]) -> list[int]:
     """Corners of a face, as indices into `points`: counter-clockwise as seen from outside, the least index first.
 
-    `members` are the indices of all points of the face, some of which may lie on its edges.
+    `members` are the indices of all points of the face, some of which may lie on its edges. `hull` is Qhull's result,
+    and `face` lists the numbers of its triangles that form the face.
     """
     from scipy.spatial import ConvexHull
 

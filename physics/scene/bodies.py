@@ -119,7 +119,7 @@ class Body(_Shape):
         self._set("mass", float(validation.positive(mass, (), "mass")))
 
     def _check_range(self) -> None:
-        """Refuse a mass or inertia whose inverse is not finite."""
+        """Raise a ValueError if the mass or a moment of inertia is so small or large that its inverse is not finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             moments = np.diagonal(self.inertia)
         inertia.check_range(np.array([self.mass]), moments[None])
@@ -258,7 +258,10 @@ class Sphere(Body):
 
     @staticmethod
     def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-        """Principal moments (..., 3) [kg m²] of solid spheres; `dimensions` (..., 3) is the radius, three times [m]."""
+        """Principal moments (..., 3) [kg m²] of solid spheres of `mass` (...) [kg].
+
+        `dimensions` (..., 3) is the radius, three times [m].
+        """
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
@@ -316,7 +319,10 @@ class Ellipsoid(Body):
 
     @staticmethod
     def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m]."""
+        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m].
+
+        The moments are about the body axes; `mass` (...) is in kg.
+        """
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""Needs of a scene: the effects that can act in it."""
+"""Needs of a scene: the effects that can act in it. Scheme and compiled kernels depend on them."""
 
 from __future__ import annotations
 

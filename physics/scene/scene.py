@@ -37,7 +37,7 @@ EffectType = TypeVar("EffectType")
 
 
 class SceneWarning(UserWarning):
-    """Warning about a valid scene in which a declaration has no effect."""
+    """Warning about a scene that is valid, but in which something has no effect, such as walls without `Contact`."""
 
 
 @known_keywords

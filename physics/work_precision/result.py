@@ -103,7 +103,7 @@ class Frontier:
         return value if not math.isnan(value) else math.inf
 
     def own_error(self, measure: str | None = None) -> float:
-        """Own error of the truth in a measure; 0 if the measure needs no truth (energy, penetration)."""
+        """The truth's own error in a measure, in its unit; 0 if the measure needs no truth (energy, penetration)."""
         return float(self.floors.get(self._measure(measure), 0.0))
 
     def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:

@@ -145,12 +145,12 @@ class ReferenceTruth:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each measure."""
+        """Unit of each error measure, by its name."""
         return {name: UNITS[name] for name in ("pose", "position", "orientation", "linvel", "angvel", "event_time")}
 
     @property
     def text(self) -> str:
-        """Describe the truth in words."""
+        """Description of the truth for people: the steps of the two runs."""
         return f"reference at {500 * self.dt:g} ms, against itself at {1e3 * self.dt:g} ms with looser tolerances"
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:

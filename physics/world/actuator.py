@@ -184,7 +184,7 @@ class Actuation:
             self._late.append((age, command))
 
     def _rows(self, table: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Copied rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6)."""
+        """Copy the rows (k, bodies, 6) of the worlds with these indices from a table (worlds * bodies, 6)."""
         return table.reshape(-1, *self._shape[1:])[worlds]
 
 

@@ -16,7 +16,7 @@ from physics.world.batch import Batch
 
 
 def check_room(worlds: int, bodies: int, plan: Plan) -> None:
-    """Raise a ValueError for more worlds than this machine's memory holds; the system might end the process else."""
+    """Raise a ValueError for more worlds than this machine's memory holds, before the system ends the process."""
     row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.field_columns)  # the least that a body takes [bytes]
     memory = machine_memory()
     if worlds * bodies * row > memory:
@@ -35,7 +35,7 @@ def machine_memory() -> int:
 
 
 def fill(world: Batch) -> None:
-    """Write the scene's bodies and effects into the arrays of every world."""
+    """Write the scene's bodies and effects into the state and parameter arrays of all worlds of a batch."""
     scene, plan = world.scene, world.plan
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     state = world.state.reshape(world.worlds, world.body_count, at.STATE_SIZE)

@@ -1,4 +1,7 @@
-"""Restart of the gusts of some worlds of a batch, in which all worlds share one time; check for fields that read it."""
+"""Restart of the gusts of some worlds of a batch, although all its worlds share one time.
+
+Also a check whether any field of a plan depends on time.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ def reads_time(plan: Plan, params: np.ndarray) -> bool:
 
 
 def gust_phases(plan: Plan) -> int:
-    """Number of phases that decide the gusts of one world; 0 if its winds are steady."""
+    """Number of phases that decide the gusts of all winds of one world; 0 if no wind of the plan has gusts."""
     return PHASES * len(_winds(plan)) if any(_has_gusts(slot) for slot in plan.fields) else 0
 
 

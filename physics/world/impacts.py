@@ -222,7 +222,10 @@ def _read(indices, body, log, pairs, strongest, out):
 
 
 def read_impacts(world: Batch, kept: KeptImpacts, indices: np.ndarray, rows: int, body: int = EVERY_BODY) -> Impacts:
-    """Read the impacts of worlds `indices` (n,) int64 in the last step; see `World.read_impacts`."""
+    """Read the impacts of the worlds `indices` (n,) int64 in the last step, of one body or of `EVERY_BODY`.
+
+    `rows` is the number of rows of the result for each world; `World.read_impacts` tells more.
+    """
     n, bodies, log = len(indices), world.body_count, kept.log(world)
     out = Impacts(
         np.zeros(n, np.int64), np.zeros((n, rows, 3)), np.zeros((n, rows, 3)), np.zeros((n, rows), np.int64),

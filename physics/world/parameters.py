@@ -121,6 +121,9 @@ def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple
 def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:
     """Write new masses, sizes and inertia tensors into the parameters of k worlds.
 
+    An argument that is None leaves its numbers unchanged. Without `inertia_body` the inertia follows from mass and size,
+    or is that of the scene's body, scaled with the mass.
+
     Parameters
     ----------
     params : (k * bodies, PARAM_SIZE) float64, changed
@@ -134,8 +137,7 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
     size : array_like or None
         Edges, or diameters, [m], of `shape` and three numbers.
     inertia_body : array_like or None
-        Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers. None for each of
-        these leaves the value as it is; inertia then follows mass and size.
+        Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers.
     shape : tuple of int
         (k, bodies).
     """

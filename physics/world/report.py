@@ -37,7 +37,7 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """Explanation of the status, and advice."""
+        """Explanation of the status in words, and advice."""
         return _MESSAGES[self]
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""A batch of independent worlds of one scene, and the step that advances them."""
+"""Batch of independent worlds of one scene: its state, its step, and changes of it by a user."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def _indices(builder, index_type, index) -> tuple[tuple, list]:
 
 
 def _is_element(array_type, index_type) -> bool:
-    """True if `a[index]` is one element, not a view, by the types of array and index."""
+    """True if these types of array and index make `a[index]` a single element, not a view."""
     if not isinstance(array_type, types.Array) or array_type.layout not in "CA":
         return False
     each = index_type.types if isinstance(index_type, types.BaseTuple) else (index_type,)

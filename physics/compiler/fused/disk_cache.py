@@ -48,7 +48,7 @@ class _Cache:
         self._is_enabled = self.cache_path is not None and self._source.exists()
 
     def disable(self):
-        """Stop using the disk."""
+        """Stop using the disk: neither load nor keep machine code."""
         self._is_enabled = False
 
     def flush(self):

@@ -248,9 +248,10 @@ class Kernel(CPUDispatcher):
         return self._part.overloads[args]
 
     def ready_entry(self, machine_code) -> int:
-        """Address of the kernel's prepared entry (`prepared_entry`), for a result `machine_code` of `compile`.
+        """Address of the kernel's prepared entry (see the module `prepared_entry`).
 
-        TypeError if the kernel returns a value.
+        `machine_code` is a result of `compile`, which selects the types of the arguments. TypeError if the kernel
+        returns a value.
         """
         with global_compiler_lock:  # no other thread may be linking machine code meanwhile
             made = next(made for made in self.overloads.values() if made.entry_point is machine_code)

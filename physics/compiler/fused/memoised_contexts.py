@@ -209,11 +209,11 @@ class MemoisedTarget(CPUContext):
             return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
-        """Value in the pair (value, is valid) that an iterator's step returns."""
+        """Read the value from `val`, the LLVM pair (value, is valid) that an iterator's step returns."""
         return builder.extract_value(val, 0)
 
     def pair_second(self, builder, val, ty):
-        """Validity in the pair (value, is valid) that an iterator's step returns."""
+        """Read the validity from `val`, the LLVM pair (value, is valid) that an iterator's step returns."""
         return builder.extract_value(val, 1)
 
     def insert_user_function(self, func, fndesc, libs=()):

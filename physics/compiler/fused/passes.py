@@ -78,7 +78,7 @@ class _Rewrites(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _SingleAssignment(_Plain):
-    """Pass after which each variable is assigned once."""
+    """Pass that renames variables so that each is assigned only once (single assignment form)."""
 
     _name = "kernel_single_assignment"
 
@@ -99,7 +99,7 @@ class _Types(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _NoPhis(PreLowerStripPhis):
-    """Pass that replaces phi nodes by assignments at the ends of the joining branches."""
+    """Pass that replaces phi nodes by assignments at the ends of the branches that join."""
 
     _name = "kernel_no_phis"
 

@@ -125,7 +125,10 @@ def _check(element: Element) -> None:
 
 
 def _numbers(element: Element, key: str, count: int, default: str | None = None, least: int = 0) -> np.ndarray:
-    """Read the attribute `key` of an element as `count` finite numbers; with `least` it may have `least` to `count`."""
+    """Read the attribute `key` of an element as `count` finite numbers, or with `least` as `least` to `count` numbers.
+
+    `default` is the text that a missing attribute stands for. Other contents raise a ModelError.
+    """
     text = element.get(key, default)
     several = f"are {least} to {count} finite numbers" if least else f"are {count} finite numbers"
     allowed = "is one finite number" if count == 1 else several
