@@ -183,7 +183,7 @@ def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray
 
 
 def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape` with finite numbers of at least 0; an error calls it `field`."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers from 0 on; an error calls it `field`."""
     array = finite(value, shape, field)
     if not (array >= 0).all():
         raise _bad(array, array >= 0, field, "are numbers of at least 0")
@@ -270,5 +270,8 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
 
 
 def unit(array: np.ndarray, length: Any) -> np.ndarray:
-    """Divide `array` by its `length`; a length of 1 to rounding leaves it unchanged, as a second call would have."""
+    """Divide `array` by its `length`, unless that is 1 to rounding: then the array is returned unchanged.
+
+    So a second normalisation changes no bit.
+    """
     return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

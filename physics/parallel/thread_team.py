@@ -74,7 +74,7 @@ class Team:
         self._crew = spin_wait_workers.make_worker_table(self.size - 1)
         self._told: Sequence[BoundCall] | None = None  # calls that are in the crew's table
         self._futures: dict[int, Future] = {}
-        self._is_interrupted = False  # whether members may still be busy with the last run
+        self._is_interrupted = False  # whether workers may still be busy with the last run
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
@@ -146,16 +146,16 @@ class Team:
             )
 
     def _send_for_all(self) -> None:
-        """Start pool threads for the members that are not waiting in the loop."""
+        """Start pool threads for the workers that no longer wait in their loop."""
         for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WORKER_WAS_IDLE]):
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
-        """Run the loop of a member in a pool thread; this method's `self` keeps the team and its calls alive."""
+        """Run the loop of worker number `member` in a pool thread; `self` keeps the team and its calls alive."""
         self._serve(member, self._stay)
 
     def _let_go(self) -> None:
-        """End the loops of all members, and wait until they have ended."""
+        """End the loops of all workers, and wait until they have ended."""
         self._dismiss()
         for future in self._futures.values():
             future.result()

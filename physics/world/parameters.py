@@ -121,8 +121,8 @@ def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple
 def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:
     """Write new masses, sizes and inertia tensors into the parameters of k worlds.
 
-    An argument that is None leaves its numbers unchanged. Without `inertia_body` the inertia follows from mass and size,
-    or is that of the scene's body, scaled with the mass.
+    An argument that is None leaves its numbers unchanged. Without `inertia_body` the inertia follows from mass and
+    size, or is that of the scene's body, scaled with the mass.
 
     Parameters
     ----------

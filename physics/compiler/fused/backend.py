@@ -50,10 +50,10 @@ def _kept(function, called_as=PART_KIND, **options) -> Kernel:
 
 
 def part(function) -> Kernel:
-    """Make a kernel of a function: a part of other kernels, or called from Python.
+    """Make a kernel of a function, which other kernels and Python may call.
 
-    Numba is told not to inline it. Otherwise it would inline the part, and all that the part calls, wherever the part's
-    first caller is inlined, with a copy for each call.
+    Numba must not inline it. It would otherwise inline the kernel, and all kernels below it, wherever the first caller
+    is inlined, with a copy for each call.
     """
     return _kept(function, forceinline=False)
 

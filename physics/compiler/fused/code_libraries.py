@@ -34,7 +34,7 @@ class KernelOrigin(NamedTuple):
 
 
 class PartLibrary(JITCodeLibrary):
-    """Library of a part: its LLVM IR, neither linked nor optimised."""
+    """Library of a part, a kernel that other kernels call: its LLVM IR, neither linked nor optimised."""
 
     def add_ir_module(self, ir_module):
         """Take the LLVM module of the part; several wholes may link it, so its functions may be defined repeatedly."""
@@ -52,7 +52,7 @@ class PartLibrary(JITCodeLibrary):
 
 
 class WholeLibrary(JITCodeLibrary):
-    """Library of a whole: its IR is linked with that of all parts below it, and then optimised.
+    """Library of a whole, a kernel that Python calls: its IR is linked with that of all parts below it and optimised.
 
     The symbols of its parts are internal. Otherwise a process that loads two wholes from disk, made by two other
     processes, could run a part of one whole in the other where different parts have the same name.
@@ -102,7 +102,10 @@ class SharedLibrary(WholeLibrary):
 
 
 def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:
-    """List every library below `whole` once, after all of its callers: the linker drops functions without a caller."""
+    """List the libraries of all kernels below `whole`, each once and after its callers.
+
+    This order matters, since the linker drops functions that nothing calls yet.
+    """
     callees_first: dict[CodeLibrary, None] = {}
 
     def visit(library):

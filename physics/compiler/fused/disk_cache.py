@@ -143,7 +143,7 @@ def _digest_of_file(path: Path) -> bytes:
 
 
 class WholeCache(_Cache):
-    """Cache of the wholes of one kernel; a file holds the origins of its shared kernels, and Numba's data."""
+    """Cache of a kernel as Python calls it; a file holds the origins of its shared kernels, and Numba's data."""
 
     def reduce(self, made):
         """Content of the file for the compiled kernel `made`."""
@@ -158,7 +158,7 @@ class WholeCache(_Cache):
 
 
 class SharedCache(_Cache):
-    """Cache of a shared kernel's machine code; a file holds no IR, since nothing is linked with it later."""
+    """Cache of a kernel as a shared one; a file holds its machine code, but no LLVM IR, which nobody links later."""
 
     kind = "-standing"  # suffix that distinguishes its files from those of the whole of the same kernel
 

@@ -57,7 +57,7 @@ class _Flags(Flags):
 
 
 class _WholeCompiler(CompilerBase):
-    """Compiler of a whole: it runs the passes of `kernel_passes` and fills a `WholeLibrary`."""
+    """Compiler of a whole, a kernel that Python calls: it runs the passes of `kernel_passes` to a `WholeLibrary`."""
 
     library_class: type[JITCodeLibrary] = WholeLibrary
     is_entered = True  # whether it gets an entry for calls from outside: see `prepared_entry`
@@ -82,7 +82,7 @@ class _WholeCompiler(CompilerBase):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _KeepAsPart(LoweringPass):
-    """Last pass of a part: it registers the part with Numba, so that other kernels can call it."""
+    """Last pass of the compilation of a part: it registers the part with Numba, so that other kernels can call it."""
 
     _name = "keep_as_part"
 
@@ -98,7 +98,7 @@ class _KeepAsPart(LoweringPass):
 
 
 class _PartCompiler(_WholeCompiler):
-    """Compiler of a part, which stops at LLVM IR."""
+    """Compiler of a part, a kernel that other kernels call: it stops at LLVM IR."""
 
     library_class = PartLibrary
     is_entered = False

@@ -117,7 +117,7 @@ class _UserLower(Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class UserLowering(NativeLowering):
-    """Pass that lowers a user's function."""
+    """Pass that lowers a user's function to LLVM IR; exceptions in it name the line."""
 
     _name = "users_lowering"
     lowering_class = _UserLower
@@ -125,7 +125,7 @@ class UserLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class WholeLowering(NativeLowering):
-    """Pass that lowers a kernel for calls from Python."""
+    """Pass that lowers a kernel to LLVM IR, for calls from Python; it returns a status."""
 
     _name = "whole_lowering"
     lowering_class = _KernelLower
@@ -133,7 +133,7 @@ class WholeLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(WholeLowering):
-    """Pass that lowers a kernel for calls from other kernels."""
+    """Pass that lowers a kernel to LLVM IR, for calls from other kernels; it returns its value if it cannot raise."""
 
     _name = "part_lowering"
     lowering_class = _ValueLower
