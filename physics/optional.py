@@ -1,4 +1,4 @@
-"""Import of optional packages, by the calls that need them."""
+"""Import of optional packages, such as matplotlib, by the functions that need them."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ class Trajectory:
     def _why(self) -> str:
         """Words for the `repr` about the gravest status of all reports; "" if all are OK.
 
-        They count the reports with this status, and name the first of them, whose `messages` explain it.
+        The words count the reports with this status, and name the first such report, whose `messages` explain it.
         """
         met = [int(report.status[0]) for report in self.reports]
         worst = max(met, key=Status.severity, default=int(Status.OK))

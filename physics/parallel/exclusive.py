@@ -115,7 +115,7 @@ _WORLDS: weakref.WeakSet = weakref.WeakSet()
 
 
 def watch(world: Any) -> None:
-    """Register a world, so that a fork of the process can mark it as torn."""
+    """Register a world, so that a fork of the process can mark it as torn, in the middle of another thread's step."""
     _WORLDS.add(world)
 
 

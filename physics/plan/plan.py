@@ -40,7 +40,7 @@ class Plan(Switches):
 
     @property
     def key(self) -> tuple:
-        """Tuple that is equal for two plans exactly if they need the same compiled kernel."""
+        """Key of the compiled kernel: plans that need different kernels have different keys."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,

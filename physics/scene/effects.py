@@ -159,7 +159,7 @@ class Friction(Effect):
         return self.coefficient[1] / self.coefficient[0] if isinstance(self.coefficient, tuple) else 1.0
 
     def directions(self, walls: int) -> NDArray[np.float64] | None:
-        """Directions of μ1 (walls, 3) for so many walls, world frame; None with a single coefficient."""
+        """Directions of μ1 (walls, 3), one for each of `walls` walls, world frame; None with a single coefficient."""
         return None if self.axis is None else np.broadcast_to(np.array(self.axis), (walls, 3))
 
 

@@ -69,7 +69,7 @@ class Strongest(NamedTuple):
 
 
 def no_contacts(worlds: int, rows: int) -> Contacts:
-    """Make `Contacts` with zero arrays for so many worlds, and rows for each."""
+    """Make `Contacts` of zeros for `worlds` worlds, with `rows` rows for each."""
     vectors = worlds, rows, 3
     return Contacts(
         np.zeros(worlds, np.int64), np.zeros(vectors), np.zeros(vectors), np.zeros(vectors),

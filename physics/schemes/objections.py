@@ -28,7 +28,10 @@ def declared_laws(needs: Needs) -> str:
 
 
 def to_laws_of_stages(needs: Needs) -> str:
-    """Object to contact laws that act over a stage of time stepping: rolling and spin friction, and stiffness."""
+    """Message against contact laws that act over a stage of time stepping; "" if the scene has none.
+
+    These are rolling friction, spin friction and stiffness.
+    """
     unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
     if unknown:
         return (
@@ -39,7 +42,7 @@ def to_laws_of_stages(needs: Needs) -> str:
 
 
 def to_sleeping(needs: Needs) -> str:
-    """Object to the effect `Sleeping`."""
+    """Message against the effect `Sleeping`, for schemes in which bodies cannot sleep; "" if the scene lacks it."""
     if needs.sleeping:
         return (
             "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
@@ -49,7 +52,7 @@ def to_sleeping(needs: Needs) -> str:
 
 
 def to_tangential(scene: Scene, needs: Needs) -> str:
-    """Object to tangential restitution of bodies that are not spheres."""
+    """Message against tangential restitution in a scene with bodies other than spheres; "" if there is no conflict."""
     for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in needs.laws else ()):
         if body.kind != "sphere":
             return (
@@ -60,7 +63,10 @@ def to_tangential(scene: Scene, needs: Needs) -> str:
 
 
 def to_turns(needs: Needs, accuracy: Accuracy) -> str:
-    """Object to sequential impacts in a scheme that finds the collisions of a stage, but not their exact times."""
+    """Message against sequential impacts, for schemes that find the collisions of a stage, but not their exact times.
+
+    "" if the accuracy does not ask for sequential impacts, or nothing can touch.
+    """
     if needs.touching and accuracy.collisions == "sequential":
         return (
             f"Accuracy.collisions is 'sequential' with scheme {accuracy.scheme!r}; allowed where bodies touch walls "

@@ -29,8 +29,8 @@ def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
 def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
     """Upper bound of the distances of a body's points from their true places [m], (samples, bodies).
 
-    The bound is |Δx| + 2 r sin(θ/2): a rotation by θ moves no point of a body of bounding radius r by more than this
-    chord.
+    The bound is |Δx| + 2 r sin(θ/2): a rotation by θ moves no point of a body of bounding radius r by more than the
+    chord 2 r sin(θ/2).
 
     Parameters
     ----------

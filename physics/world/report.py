@@ -140,8 +140,8 @@ class StepReport:
     solves : (worlds,) int64
         Contact problems; under error control those of refused parts of a substep are counted, too.
     fallbacks : (worlds,) int64
-        Contact problems that only the pivoting methods solved. With the scheme ``events``: small leaps of first order,
-        and parts of the shortest length whose error exceeds the tolerance.
+        Contact problems on which pivoting methods were tried, after others had failed. With the scheme ``events``:
+        small leaps of first order, and parts of the shortest length whose error exceeds the tolerance.
     unconverged : (worlds,) int64
         Contact problems with a residual above the tolerance.
     impacts : (worlds,) int64

@@ -20,7 +20,7 @@ from physics.world.snapshot import KEPT, Snapshot
 
 
 class Targets(NamedTuple):
-    """Worlds to restore, and their sources in a snapshot."""
+    """Worlds of a batch to restore, and for each the world of a snapshot from which it gets its state."""
 
     worlds: np.ndarray | None  # (k,) indices into the batch; None: all
     source: np.ndarray | None  # (k,) indices into the snapshot; None: its one world, or its worlds in their order

@@ -20,7 +20,7 @@ _PAUSES = {
 
 
 def _pointer(context, builder, sig, args):
-    """Pointer to table[row, column]; these three are the first arguments."""
+    """Pointer to the element table[row, column], where `args` begins with table, row and column."""
     return element_pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
 
 

@@ -88,26 +88,29 @@ class ValueCallConv(CPUCallConv):
         return func.args if returns_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):
-        """Write the return of the value `retval`."""
+        """Write the instructions that return `retval` from the function that `builder` writes."""
         if returns_value(builder.function):
             builder.ret(retval)
         else:
             super().return_value(builder, retval)
 
     def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
-        """Write the return with an exception; by default it names the line of the user's present statement."""
+        """Write the instructions that leave a function with the exception `exc`.
+
+        By default the exception names the line of the user's present statement.
+        """
         self.must_give_status(builder)
         if loc is None:
             loc, func_name = getattr(builder, "place", (None, func_name))
         super().return_user_exc(builder, exc, exc_args, loc, func_name)
 
     def return_dynamic_user_exc(self, builder, *about, **more):
-        """Write the return with an exception whose arguments are computed at run time."""
+        """Write the instructions that leave a function with an exception whose arguments are computed at run time."""
         self.must_give_status(builder)
         super().return_dynamic_user_exc(builder, *about, **more)
 
     def return_status_propagate(self, builder, status):
-        """Write the return with the exception of a call, if its status says that it raised one."""
+        """Write the instructions that leave a function with the exception of a call, if `status` is that of one."""
         if status.code is not RETCODE_OK:
             self.must_give_status(builder)
             super().return_status_propagate(builder, status)

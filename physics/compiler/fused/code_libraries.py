@@ -95,7 +95,7 @@ class SharedLibrary(WholeLibrary):
         return self._get_compiled_object()
 
     def take(self, machine_code: bytes) -> None:
-        """Use machine code from disk, the result of `machine_code`."""
+        """Take over machine code that was read from disk, in the form that the method `machine_code` returns."""
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()

@@ -155,23 +155,23 @@ class FoldingBuilder(KernelBuilder):
         return super().insert_value(_as_value(self, agg), _as_value(self, value), _position(idx), name)
 
     def store(self, value, ptr, align=None):
-        """Write the store of a value at an address."""
+        """Write the instruction that stores a value, possibly a structure, at the address `ptr`."""
         return super().store(_as_value(self, value), ptr, align)
 
     def call(self, fn, args, *more, **named):
-        """Write the call of a function."""
+        """Write the instruction that calls the LLVM function `fn` with the values `args`."""
         return super().call(fn, [_as_value(self, each) for each in args], *more, **named)
 
     def select(self, cond, lhs, rhs, *more, **named):
-        """Write the choice of one of two values by a condition."""
+        """Write the instruction that chooses `lhs` if `cond` is true, else `rhs`."""
         return super().select(cond, _as_value(self, lhs), _as_value(self, rhs), *more, **named)
 
     def ret(self, value):
-        """Write the return of a value."""
+        """Write the instruction that returns a value from the function."""
         return super().ret(_as_value(self, value))
 
     def mul(self, lhs, rhs, name="", flags=()):
-        """Write the product of two integers, unless constants make it known."""
+        """Return the product of two integers: a known value if both are constants or one is 1, else an instruction."""
         if _is(lhs, 1):
             return rhs
         if _is(rhs, 1):
@@ -181,7 +181,7 @@ class FoldingBuilder(KernelBuilder):
         return super().mul(lhs, rhs, name, flags)
 
     def add(self, lhs, rhs, name="", flags=()):
-        """Write the sum of two integers, unless constants make it known."""
+        """Return the sum of two integers: a known value if both are constants or one is 0, else an instruction."""
         if _is(lhs, 0):
             return rhs
         if _is(rhs, 0):

@@ -116,7 +116,7 @@ class MemoisedTyping(typing.Context):
 
 @cache
 def memoised(context: typing.Context) -> MemoisedTyping:
-    """Memoised form of a typing context of Numba: always the same object, since Numba compares contexts."""
+    """Memoised form of a typing context of Numba: always the same object, as Numba keeps compiled code by context."""
     return MemoisedTyping(context)
 
 

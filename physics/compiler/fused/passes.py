@@ -154,7 +154,7 @@ def numbas_passes(state, own: dict[type, type], *after_lowering: type) -> PassMa
     state : numba.core.compiler.StateDict
         State of the compilation.
     own : dict
-        Replacement by replaced pass of Numba; `NativeLowering` must be among the replaced ones.
+        Dictionary from passes of Numba to their replacements; `NativeLowering` must be among its keys.
     *after_lowering : type
         Passes that follow the lowering.
     """

@@ -164,7 +164,7 @@ def _alike(builder, values) -> list:
 
 
 def _make(context, builder, sig, args):
-    """Lower `Lanes(a, b, c, d)`."""
+    """Lower `Lanes(a, b, c, d)`: put four numbers into a vector."""
     made = ir.Constant(context.get_value_type(LANES), ir.Undefined)
     for k, value in enumerate(args):
         made = builder.insert_element(made, value, _INDEX(k))
@@ -186,7 +186,7 @@ def _choose(context, builder, sig, args):
 
 
 def _one_of_two(order, context, builder, sig, args):
-    """Lower `larger` and `smaller`; `order` is ``>`` or ``<``."""
+    """Lower `larger` (`order` is ``>``) or `smaller` (``<``) of two lanes or numbers."""
     x, y = _alike(builder, args)
     return builder.select(builder.fcmp_ordered(order, y, x), y, x)
 
@@ -230,7 +230,7 @@ def _read_row(context, builder, sig, args):
 
 
 def _write_row(context, builder, sig, args):
-    """Lower `store_lanes`."""
+    """Lower `store_lanes`: write four neighbouring numbers of a table; the alignment is that of one number."""
     builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
     return context.get_dummy_value()
 
@@ -269,7 +269,7 @@ def _total(context, builder, sig, args):
 
 
 def _extreme(order, context, builder, sig, args):
-    """Lower `max_of_lanes` and `min_of_lanes`; `order` is ``>`` or ``<``."""
+    """Lower `max_of_lanes` (`order` is ``>``) or `min_of_lanes` (``<``)."""
     return _halves(builder, args[0], lambda x, y: builder.select(builder.fcmp_ordered(order, y, x), y, x))
 
 

@@ -72,7 +72,7 @@ def _put_together(builder, type_: ir.Type, words):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers the operation `key` if it is `t[k]` or `x in t` for such tuples, else None."""
+    """Return the function that lowers the operation `key` if it is `t[k]` or `x in t` for tuples of numbers."""
     if len(sig.args) != 2 or not isinstance(sig.args[0], types.UniTuple):
         return None
     members, other = sig.args

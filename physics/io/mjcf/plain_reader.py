@@ -142,7 +142,7 @@ def _numbers(element: Element, key: str, count: int, default: str | None = None,
 
 
 def _integer(element: Element, key: str, default: int) -> int:
-    """Read the attribute `key` of an element as an integer."""
+    """Read the attribute `key` of an element as an integer; `default` if the element lacks it."""
     text = element.get(key, str(default))
     try:
         return int(text)
