@@ -84,7 +84,10 @@ def compiling():
 
 
 def _tell(count: Callable[[], int], is_over: threading.Event) -> None:
-    """Print a line once `COMPILE_NOTICE` has passed and `count()`, the number of compilations, is above 0."""
+    """Print a line once `COMPILE_NOTICE` has passed and `count()`, the number of compilations, is above 0.
+
+    Nothing is printed if `is_over` is set before.
+    """
     while not is_over.wait(COMPILE_NOTICE):
         if count() > 0:
             text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."
