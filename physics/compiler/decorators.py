@@ -44,9 +44,9 @@ def kernel(function):
 
     An effect switch among the arguments is ``None`` for off, anything else for on. Since a kernel is compiled for the
     types of its arguments, code behind a switch that is off is removed. Numba removes a branch on ``x is not None``
-    before type inference only if x itself is an argument; other branches must have types even if they never run. A
-    branch that would have no types, or is large, becomes a function of its own that the type of the switch chooses
-    (`if_given`).
+    before type inference only if x itself is an argument, and None; all other branches must have types even if they
+    never run. A branch that would have no types, or is large, becomes a function of its own that the type of the switch
+    chooses (`if_given`).
 
     In a kernel with branches no variable may have the name of another one followed by digits, as x1 and x12: Numba may
     mistake one for the other, and then cannot compile the kernel (`tests/kernels/test_variable_names.py`).
