@@ -1,6 +1,6 @@
-"""A rigid-body engine written from scratch: quaternion state, impulses and complementarity, compiled by Numba.
+"""Rigid-body engine: quaternion state, contacts by impulses and complementarity, kernels compiled by Numba.
 
-The contract in five lines::
+Its whole use in five lines::
 
     scene = physics.Scene(bodies=[physics.Block(size=(5, 3, 2), mass=6.0, pos=(0, 6, 0))],
                           walls=physics.three_walls(half_width=10.0),
@@ -107,7 +107,7 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # a checker of types would take any name for one that is there
+if not TYPE_CHECKING:  # else a type checker would accept every name as an attribute of the module
 
     def __getattr__(name: str) -> object:
         raise _no_attribute(__name__, name, __all__)

@@ -57,29 +57,30 @@ class Accuracy:
         of the error of a part, and at least 1e-11.
     iterations : int
         Largest number of sweeps per contact problem; one sweep is n contact updates for n contacts. It also limits the
-        iterations with a linear system, for bodies that touch each other. Where that system would take more time than
-        ten times those sweeps (large piles at ``fast``, while they move) there are sweeps only.
+        iterations of the solvers that factor a linear system, for bodies that touch each other. Where one
+        factorisation would take longer than ten times this number of sweeps (large piles at ``fast``, while they
+        move) only sweeps are used.
     impacts : int
         Largest number of impacts of one body that one substep resolves in time. Further impacts are reported and
         treated as plastic. With ``events`` it counts all events, and the rest of the substep is left out. Where bodies
         touch each other it counts impacts of all of them, in one substep or part.
     slop : float
-        Gap within which a feature touches a wall, in bounding radii. Without ``events`` it is also the error of the
-        place of an impact. With ``events`` a rebound up to a few slops high is not made; where bodies touch each other
-        the slop is at least 1e-12 there.
+        Gap within which a feature touches a wall, in bounding radii. Without ``events`` the position of an impact has
+        an error of up to one slop. With ``events`` a rebound at most a few slops high is left out, and the slop is at
+        least 1e-12 where bodies touch each other.
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.
     slip : str
         Slip that friction opposes in a step of time stepping in which one or two points of a body touch walls.
         ``mean``: the mean of the slips before and after the step, of second order. ``end``: the slip after it, as for
-        faces and between bodies. This is quicker, and of first order where the direction of sliding turns.
+        faces and between bodies. ``end`` is quicker, and of first order where the direction of sliding turns.
     collisions : str
         Law of contacts that collide at the same moment. ``simultaneous``: one contact problem of all of them.
         ``sequential``, with ``events`` or where bodies touch each other: one contact after the other, until none
-        approaches. The one that approaches fastest comes first; of equals the one of the lowest wall and vertex. Where
-        this has no end in sight the rest collides at once, and is reported (unconverged, or unresolved). These are two
-        laws, not two accuracies: their outcomes differ where several contacts collide.
+        approaches. The contact that approaches fastest comes first; among equals the one of the lowest wall and vertex.
+        Where this sequence does not end, the remaining contacts collide at once, and the report says so (unconverged,
+        or unresolved). These are two laws, not two accuracies: their outcomes differ where several contacts collide.
 
     Raises
     ------
@@ -123,7 +124,10 @@ PRESETS: dict[Preset, Accuracy] = {
 
 
 def resolve(accuracy: Preset | Accuracy, field: str = "accuracy") -> Accuracy:
-    """Return the `Accuracy` of a preset's name, or the one given; messages name it `field`."""
+    """Return `accuracy` itself if it is an `Accuracy`, else the preset of this name.
+
+    Any other value is a ValueError, whose message calls the argument `field` and lists the presets.
+    """
     if isinstance(accuracy, Accuracy):
         return accuracy
     known: Any = PRESETS

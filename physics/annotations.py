@@ -6,33 +6,33 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 Vector = tuple[float, float, float]
-"""Type of three numbers of a frozen description, made from any sequence or array of three."""
+"""Three floats, as bodies, walls and effects store a vector; users may give any sequence or array of three numbers."""
 
 Quaternion = tuple[float, float, float, float]
-"""Type of four numbers (w, x, y, z) of a frozen description."""
+"""Four floats (w, x, y, z), as bodies store an attitude; users may give any sequence or array of four numbers."""
 
 Shape = Literal["block", "sphere", "ellipsoid", "hull"]
-"""Name of a kind of body."""
+"""Name of the shape of a body, as in `Body.kind`."""
 
 Frame = Literal["world", "body"]
-"""Name of the frame of a vector."""
+"""Name of the frame in which a vector's components are given."""
 
 Layout = Literal["three", "corner"]
-"""Name of a layout of walls."""
+"""Name of a set of walls: ``three`` for `physics.three_walls`, ``corner`` for `physics.corner`."""
 
 Preset = Literal["fast", "balanced", "precise", "reference"]
-"""Name of an accuracy."""
+"""Name of a preset of accuracy; see `physics.PRESETS`."""
 
 SchemeName = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
-"""Name of an integration scheme; see `physics.Accuracy`."""
+"""Name of an integration scheme, as `physics.Accuracy` explains them."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-"""Type variable of a function whose signature a decorator keeps."""
+"""Type variable for decorators that return a function of the same signature."""
 
 if TYPE_CHECKING:
 
     class Effect:
-        """Base class of effects, so that checkers see a list of different ones as a list of effects."""
+        """Common base class of all effects, for type checkers: a list of different effects is then a `list[Effect]`."""
 
 else:
     Effect = object

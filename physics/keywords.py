@@ -1,4 +1,4 @@
-"""Unknown keywords of public constructors: an error that lists the known ones, the nearest first."""
+"""Errors for unknown names, such as keywords of public constructors: they list the known names, the nearest first."""
 
 from __future__ import annotations
 
@@ -16,46 +16,46 @@ ALIKE = 0.6
 
 
 def nearest_first(name: object, allowed: Iterable[str]) -> list[str]:
-    """The names `allowed`, those that are like `name` first, the nearest of them ahead; the rest keep its order."""
+    """Sort the names `allowed`: first those spelt like `name`, the most similar ahead, then the rest in its order."""
     allowed = list(allowed)
     first = alike(name, allowed)
     return [*first, *(known for known in allowed if known not in first)]
 
 
 def alike(name: object, allowed: Iterable[str]) -> list[str]:
-    """Those of the names `allowed` that `name` may be a misspelling of, the nearest first."""
+    """Select the names in `allowed` of which `name` may be a misspelling, the most similar first."""
     text, allowed = str(name).lower(), list(allowed)
     likeness = {known: difflib.SequenceMatcher(None, text, known.lower()).ratio() for known in allowed}
     return sorted((known for known in allowed if likeness[known] >= ALIKE), key=lambda known: -likeness[known])
 
 
 def no_attribute(module: str, name: str, allowed: Iterable[str]) -> AttributeError:
-    """Error for a name that a module does not have: it lists those it has, the nearest first."""
+    """Make the error for an unknown attribute `name` of a module; it lists the names `allowed`, the nearest first."""
     return AttributeError(
         f"module {module!r} has no attribute {name!r}; allowed are {', '.join(nearest_first(name, allowed))}"
     )
 
 
 def known_keywords(target: Function) -> Function:
-    """Let a function, or a class when it is made, refuse unknown keywords with the list of those it knows.
+    """Decorate a function or class: an unknown keyword raises an error that lists the known ones.
 
-    This decorator stands above `dataclass` if both are used. The signature stays, for editors, `help` and
-    `inspect.signature`. A call only looks up the given names; functions of a step do without the decorator.
+    This decorator stands above `dataclass` if both are used. `help`, editors and `inspect.signature` still see the
+    original signature. The check of each call costs a look-up per keyword, so functions of a step are not decorated.
 
     Parameters
     ----------
     target : function or method, or class with an ``__init__`` of its own
-        Without ``**kwargs``: such a target knows every keyword.
+        Its signature must not have ``**kwargs``, with which no keyword would be unknown.
 
     Returns
     -------
-    The class itself, or a function in place of the one given.
+    The same class with a checked ``__init__``, or a function that checks its keywords and then calls `target`.
 
     Raises
     ------
     TypeError
-        When called: ``World got an unexpected keyword argument 'acuracy' (given: 'fast'); allowed are accuracy, ...``.
-        Libraries look for Python's own words in it (TorchRL).
+        Raised by a call: ``World got an unexpected keyword argument 'acuracy' (given: 'fast'); allowed are accuracy,
+        ...``. It contains Python's own words "got an unexpected keyword argument", for which TorchRL looks.
     """
     if isinstance(target, type):
         kind: Any = target
@@ -66,7 +66,10 @@ def known_keywords(target: Function) -> Function:
 
 
 def _checked(function: Callable, name: str, first: int = 0) -> Callable:
-    """`function` with its keywords looked at; its parameters from number `first` on are the user's."""
+    """Wrap `function` with a check of its keywords; errors call it `name`.
+
+    The first `first` parameters, such as `self`, are not listed as keywords.
+    """
     parameters = list(inspect.signature(function).parameters.values())[first:]
     keywords = [p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
     if any(p.kind == p.VAR_KEYWORD for p in parameters):

@@ -1,4 +1,4 @@
-"""Packages imported only by the calls that need them."""
+"""Import of optional packages, such as matplotlib, by the functions that need them."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def load_optional(module: str, purpose: str) -> ModuleType:
     module : str
         Such as ``pandas`` or ``matplotlib.figure``.
     purpose : str
-        The subject of the message: "a plot".
+        Subject of the error's sentence, such as "a plot" in "a plot needs matplotlib".
 
     Raises
     ------
     ModuleNotFoundError
-        The package is not installed: names it, and the line that installs it.
+        The package is not installed. The message names it, and the command that installs it.
     """
     try:
         return import_module(module)
@@ -36,14 +36,17 @@ def load_optional(module: str, purpose: str) -> ModuleType:
 
 
 def missing(module: str, purpose: str) -> ModuleNotFoundError:
-    """Error that names an optional package, and the line that installs it; arguments as of `load_optional`."""
+    """Make the error for a package that is not installed: it names the package and the command that installs it.
+
+    The arguments are those of `load_optional`.
+    """
     package = module.partition(".")[0]
     name, line = INSTALLED_BY[package]
     return ModuleNotFoundError(f"{purpose} needs {name}, which is not installed: {line}", name=package)
 
 
 def find_optional(module: str, least: tuple[int, ...] = ()) -> ModuleType | None:
-    """Module of an optional package; None if the package is missing or older than the version `least`."""
+    """Import a module of an optional package; return None if the package is missing or older than version `least`."""
     try:
         found = import_module(module)
     except ModuleNotFoundError as error:

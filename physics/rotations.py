@@ -1,4 +1,4 @@
-"""Rotations in NumPy, outside of kernels."""
+"""Rotation matrices and products of quaternions (w, x, y, z), in NumPy: for code that is not compiled."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def rotation_matrices(quat: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) rotation matrices, body to world, of unit quaternions (..., 4)."""
+    """Rotation matrices (..., 3, 3), body to world, of unit quaternions (..., 4) in the order (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quat, dtype=float), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -17,6 +17,6 @@ def rotation_matrices(quat: np.ndarray) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) of the rotation `b` (4,), then `a` (4,)."""
+    """Product a b (4,) of two quaternions (4,): the rotation by `b`, followed by the rotation by `a`."""
     vector = a[0] * b[1:] + b[0] * a[1:] + np.cross(a[1:], b[1:])
     return np.concatenate(([a[0] * b[0] - a[1:] @ b[1:]], vector))

@@ -10,22 +10,22 @@ from typing import Protocol
 
 import numpy as np
 
-# Characters of a value in a message, and of a line of a `repr`: two lines and one line of a narrow terminal.
+# Most characters of a value in a message: two lines of a narrow terminal. Most characters of a line of a `repr`.
 LONGEST_VALUE = 160
 LINE = 80
 
 # Characters that fit on a screen: ten lines.
 SCREEN = 10 * LINE
 
-# Numbers of an array that are shown.
+# An array with at most so many numbers is shown with its numbers, a larger one by its shape.
 MOST_NUMBERS = 12
 
-# Integers of more bits than this are told by their length.
+# An integer with more bits than this is shown by its number of bits.
 MOST_BITS = 128
 
 
 class _Short(reprlib.Repr):
-    """`repr` cut to a few items of each kind."""
+    """Shortened `repr`: a few items of each container, long texts cut, large arrays and integers by their size."""
 
     def __init__(self):
         super().__init__()
@@ -34,15 +34,15 @@ class _Short(reprlib.Repr):
         self.maxstring = self.maxother = LONGEST_VALUE
 
     def repr_int(self, x, level):
-        """Digits, or the number of bits if Python would take long to print the digits."""
+        """Digits of an integer, or its number of bits if there are more than `MOST_BITS`: printing takes long then."""
         return repr(x) if x.bit_length() <= MOST_BITS else f"an integer of {x.bit_length()} bits"
 
     def repr_float64(self, x, level):
-        """Represent a NumPy float as Python's own."""
+        """Represent a NumPy float like a Python float."""
         return repr(float(x))
 
     def repr_ndarray(self, x, level):
-        """Numbers of an array, or its shape if it has many."""
+        """Numbers of an array, or its shape if it has more than `MOST_NUMBERS`."""
         if x.size > MOST_NUMBERS:
             return f"an array of shape {x.shape}"
         return repr(x.item()) if x.ndim == 0 else np.array2string(x, precision=6, separator=", ")
@@ -52,7 +52,7 @@ _SHORT = _Short()
 
 
 def shown(value: object, longest: int = LONGEST_VALUE) -> str:
-    """Value on one line of at most `longest` characters."""
+    """Short `repr` of a value on one line; its middle is left out if it has more than `longest` characters."""
     text = " ".join(_SHORT.repr(value).split())
     if len(text) <= longest:
         return text
@@ -61,7 +61,7 @@ def shown(value: object, longest: int = LONGEST_VALUE) -> str:
 
 
 def fields_repr(item) -> str:
-    """Standard `repr` of a dataclass, or one shortened field per line if that fills a screen."""
+    """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value."""
     parts = [(field.name, getattr(item, field.name)) for field in fields(item) if field.repr]
     name = type(item).__qualname__
     text = f"{name}({', '.join(f'{key}={value!r}' for key, value in parts)})"
@@ -72,19 +72,19 @@ def fields_repr(item) -> str:
 
 
 class HasParts(Protocol):
-    """Class whose `repr` is made of parts."""
+    """Protocol of objects that list their parts, from which `parts_repr` and `html_table.parts_table` are made."""
 
     def _parts(self) -> tuple[str, ...]:
-        """Parts of the `repr`: a name and its value, such as ``dt=0.01`` or ``events: none``, or any other words."""
+        """Parts to show: texts such as ``dt=0.01`` or ``events: none``, each a name with its value, or other words."""
 
 
 def parts_repr(item: HasParts) -> str:
-    """`repr` of an object from its parts, broken at full lines."""
+    """`repr` of an object: its class and its parts, broken into lines of at most `LINE` characters."""
     return lines_repr(type(item).__name__, *item._parts())
 
 
 def lines_repr(name: str, *parts: str) -> str:
-    """``name(part, ...)`` broken between parts, with parts cut to the width of the screen."""
+    """Text ``name(part, ...)``, broken between parts into lines of at most `LINE` characters; longer parts are cut."""
     lines, indent = [f"{name}("], " " * (len(name) + 1)
     for k, part in enumerate(parts):
         end = ")" if k == len(parts) - 1 else ","
@@ -100,7 +100,7 @@ def lines_repr(name: str, *parts: str) -> str:
 
 
 def counted(names: Iterable[str], most: int = 8) -> str:
-    """Names with their counts, in order of first occurrence: ``30 Block, 20 Sphere``."""
+    """Count equal names, in order of first occurrence, as in ``30 Block, 20 Sphere``; at most `most` different ones."""
     found = Counter(names)
     told = [name if times == 1 else f"{times} {name}" for name, times in list(found.items())[:most]]
     return ", ".join(told + ["..."] * (len(found) > most)) or "none"

@@ -59,12 +59,12 @@ class Scene:
 
     @cached_property
     def frames(self):
-        """Axes n, t1, t2 of each wall (walls, 3, 3)."""
+        """Unit normal n and tangents t1, t2 of each wall, as rows (walls, 3, 3)."""
         return np.array([[wall.normal, *np.linalg.svd([wall.normal])[2][1:]] for wall in self.walls]).reshape(-1, 3, 3)
 
 
 def make_state(scene, pos, quat=(1, 0, 0, 0), linvel=(0, 0, 0), angvel=(0, 0, 0)):
-    """Y (13,) from position [m], attitude, velocity [m/s] and angular velocity [rad/s] in the world frame."""
+    """State Y (13,) from position [m], attitude, velocity [m/s] and angular velocity [rad/s] in the world frame."""
     Y = np.concatenate([pos, quat, scene.mass * np.array(linvel), np.zeros(3)])
     return np.concatenate([Y[:10], np.linalg.solve(auxiliary(scene, Y)[1], angvel)])
 
@@ -75,7 +75,7 @@ def star(a):
 
 
 def auxiliary(scene, Y):
-    """Arms r = R r_body of the vertices (8, 3), I⁻¹, v and ω of the state."""
+    """Arms r = R r_body of the vertices (8, 3) [m], inverse inertia I⁻¹ (3, 3), and velocities v and ω of a state Y."""
     q, square = Y[3:7], np.square(scene.size)
     R = np.eye(3) + 2 / (q @ q) * (q[0] * star(q[1:]) + star(q[1:]) @ star(q[1:]))
     moments = scene.mass / 12 * (square.sum() - square)  # of I_body: M (b² + c²)/12 about the edge a
@@ -84,12 +84,12 @@ def auxiliary(scene, Y):
 
 
 def quaternion_rate(omega, q):
-    """½ ω q = ½ (-ω·v, w ω + ω x v) of q = (w, v)."""
+    """Rate dq/dt = ½ ω q = ½ (-ω·v, w ω + ω x v) of a quaternion q = (w, v) at the angular velocity ω [rad/s]."""
     return 0.5 * np.array([-omega @ q[1:], *(q[0] * omega + star(omega) @ q[1:])])
 
 
 def derivative(scene, Y, contacts):
-    """dY/dt under gravity and the forces of resting contacts."""
+    """Rate dY/dt (13,) of the state under gravity and the forces of resting `contacts` (k, 3): see `find_contacts`."""
     _, _, v, omega = auxiliary(scene, Y)
     load = scene.mass * np.array([*scene.gravity, 0.0, 0.0, 0.0])
     if len(contacts):
@@ -98,7 +98,7 @@ def derivative(scene, Y, contacts):
 
 
 def rk4(scene, Y, contacts, h):
-    """Y after h [s] by the classical Runge-Kutta method, with the same resting contacts throughout."""
+    """State Y after h [s] by the classical Runge-Kutta method, with the same resting `contacts` throughout."""
     k1 = derivative(scene, Y, contacts)
     k2 = derivative(scene, Y + h / 2 * k1, contacts)
     k3 = derivative(scene, Y + h / 2 * k2, contacts)
@@ -108,19 +108,19 @@ def rk4(scene, Y, contacts, h):
 
 
 def gaps(scene, Y):
-    """Distance of each vertex from each wall [m], (8, walls); negative where it penetrates."""
+    """Distance of each vertex of the block from each wall [m], (8, walls); negative where it penetrates."""
     return (Y[:3] + auxiliary(scene, Y)[0]) @ scene.frames[:, 0].T - [wall.offset for wall in scene.walls]
 
 
 def find_contacts(scene, Y):
-    """Vertex, wall, and 1 where it slips, of each contact (k, 3); and its velocity u (k, 3)."""
+    """Find contacts: rows (vertex, wall, 1 if it slips, else 0) (k, 3), and their velocities u (n, t1, t2) (k, 3)."""
     pairs = np.argwhere(gaps(scene, Y) <= TOUCH)
     _, _, u = contact_jacobian(scene, Y, pairs)
     return np.column_stack([pairs, np.linalg.norm(u[:, 1:], axis=1) > SLOW]), u
 
 
 def contact_jacobian(scene, Y, contacts):
-    """J (3k, 6), diag(M, I)⁻¹ Jᵀ (6, 3k) and u (k, 3). A row of J: n·(v + ω x r) = n·v + (r x n)·ω."""
+    """J (3k, 6), diag(M, I)⁻¹ Jᵀ (6, 3k), velocities u (k, 3). A row of J: n·(v + ω x r) = n·v + (r x n)·ω."""
     arms, inverse, v, omega = auxiliary(scene, Y)
     axes, r = scene.frames[contacts[:, 1]], arms[contacts[:, :1]]
     J = np.concatenate([axes, np.cross(r, axes)], axis=2).reshape(-1, 6)
@@ -129,7 +129,7 @@ def contact_jacobian(scene, Y, contacts):
 
 
 def resolve_impacts(scene, Y):
-    """Y after the impacts of all contacts at once; and again, where a contact approaches after them."""
+    """State Y after impacts: all contacts collide at once, and again until no contact approaches its wall."""
     for _ in range(100):
         contacts, u = find_contacts(scene, Y)
         if (u[:, 0] >= -SLOW).all():
@@ -153,7 +153,7 @@ def resting_contact(scene, Y, contacts):
 
 
 def solve_contacts(A, b, mu, slip):
-    """Forces f (3k,) of 0 <= f_n ⟂ a_n >= 0 with a = A f + b, and friction; or impulses, with velocities for a.
+    """Contact forces f (3k,) with 0 <= f_n ⟂ a_n >= 0, a = A f + b, and friction. Velocities for a: impulses.
 
     Where `slip` (k, 2) is a unit vector, f_t = -μ f_n slip. Elsewhere a_t = 0, or f_t = -μ f_n a_t/|a_t|. Lemke's
     method finds forces without friction; from there Newton's method follows them as μ grows, in few steps or in many.
@@ -177,7 +177,7 @@ def solve_contacts(A, b, mu, slip):
 
 
 def natural_map(A, b, mu, slip, f):
-    """Residual of the law of contact (3k,): f less the projection of f - a on the cone |f_t| <= μ f_n."""
+    """Residual (3k,) of the contact law: f less the projection of f - a, a = A f + b, on the cone |f_t| <= μ f_n."""
     trial = (f - A @ f - b).reshape(-1, 3)
     push, length = np.maximum(trial[:, :1], 0.0), np.linalg.norm(trial[:, 1:], axis=1, keepdims=True)
     grip = trial[:, 1:] * np.minimum(1.0, mu * push / np.maximum(length, ROUNDING))
@@ -226,7 +226,7 @@ def limit_stage(scene, Y, contacts, h):
 
 
 def correct_positions(scene, Y, contacts):
-    """Y with zero gap and velocity of contacts that hold: the least change, measured by kinetic energy."""
+    """State Y with zero gaps and velocities at contacts that hold: the least change, measured by kinetic energy."""
     J, response, u = contact_jacobian(scene, Y, contacts)
     holds = np.abs(resting_contact(scene, Y, contacts)[2]) < STILL
     holds[:, 1:] = (holds.all(axis=1) & (contacts[:, 2] == 0))[:, None]  # along the wall: contacts that stick
@@ -238,7 +238,7 @@ def correct_positions(scene, Y, contacts):
 
 
 def step(scene, Y, h):
-    """Y after h [s]."""
+    """State Y (13,) of a scene's block after a step of h [s]."""
     while h > 0.0:
         Y = resolve_impacts(scene, Y)
         contacts, u = find_contacts(scene, Y)

@@ -1,22 +1,22 @@
-"""All or nothing: a block that ends with an exception has changed nothing."""
+"""Undo of the changes that a ``with`` block made before it raised an exception."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Undo = Callable[[], None]
-"""Function that puts something back as it was when the function was made."""
+"""Function that restores an object to its state of the moment at which the function was made."""
 
 
 class undo_on_error:
-    """Put everything back where a block raises an exception, an interrupt among them.
+    """Context manager that undoes changes where its block raises an exception, `KeyboardInterrupt` included.
 
-    A class and no generator, which would take four times as long: a control step of a batch goes through it.
+    It is a class, since a generator would take four times as long, and every control step of a batch enters it.
 
     Parameters
     ----------
     *undo : Undo or None
-        Called in this order. None: nothing is to be put back.
+        Functions to call, in this order, after an exception. None is skipped.
     """
 
     __slots__ = ("_undo",)

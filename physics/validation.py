@@ -1,4 +1,8 @@
-"""Checks of users' arguments. Every failure is a ValueError that names field, value and allowed values."""
+"""Checks of users' arguments.
+
+A check returns the value that it was given, converted where the function says so. A bad value raises a ValueError that
+names the argument, called `field` here, the value and the allowed values.
+"""
 
 from __future__ import annotations
 
@@ -17,23 +21,26 @@ from physics.keywords import nearest_first
 from physics.parallel.bound_call import compiled
 from physics.summary import shown
 
-# A quaternion counts as a unit quaternion within this; it is then normalised to rounding. Four decimals of each
-# component are what people type and tables print: each is off by up to 5e-5, the four together by a vector of length
-# 1e-4, and by the triangle inequality so is the norm.
+# A quaternion is accepted as a unit quaternion if its norm is 1 within this; it is then normalised to rounding. People
+# type, and tables print, four decimals of each component. Each component is then off by up to 5e-5, all four together
+# by a vector of length 1e-4, and by the triangle inequality the norm by as much.
 UNIT_TOLERANCE = 1e-4
 
-# A vector of up to four components divided by its length has length 1 within this: half an ulp of each quotient and of
-# the length, and rounding of the length when it is measured again.
+# A vector of up to four components, divided by its length, has length 1 within this. The rounding errors are half an
+# ulp of each quotient and of the length, and that of the length when it is measured again.
 UNIT_ROUNDING = 4 * np.finfo(float).eps
 
-# Largest count: what fits into every integer that it may be stored in.
+# Largest count: it fits into every type of integer in which a count is stored.
 MOST = 2**31 - 1
 
 FLOAT64 = np.dtype(np.float64)
 
 
 def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
-    """`value` as a float64 array of real numbers: no bools, strings, complex or masked ones, no None."""
+    """Convert `value` to a float64 array; bools, strings, complex numbers, masked values and None are refused.
+
+    The message calls the argument `field` and ends with "allowed" and the words `allowed`.
+    """
     array = _real(value)
     if array is None:
         raise ValueError(f"{field} is {shown(value)}; allowed {allowed}")
@@ -41,7 +48,7 @@ def floats(value: ArrayLike, field: str, allowed: str) -> np.ndarray:
 
 
 def _real(value: ArrayLike) -> np.ndarray | None:
-    """`value` as a float64 array; None if it is no array of real numbers."""
+    """Convert `value` to a float64 array; return None if it is no array of real numbers."""
     if type(value) is np.ndarray:
         array = value
     else:
@@ -61,7 +68,7 @@ def _real(value: ArrayLike) -> np.ndarray | None:
 
 
 def _of_objects(array: np.ndarray) -> np.ndarray | None:
-    """An array of fractions, decimals or large integers as float64."""
+    """Convert an array of Python numbers (fractions, decimals, large integers) to float64; None if that fails."""
     try:
         return array.astype(np.float64) if all(map(_is_real, array.flat)) else None
     except OverflowError:  # too large for a float
@@ -73,7 +80,7 @@ def _is_real(item) -> bool:
 
 
 def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """`value` as a float64 array of exactly `shape`."""
+    """Convert `value` to a float64 array, which must have exactly this `shape`; an error calls it `field`."""
     array = floats(value, field, f"are numbers in shape {shape}" if shape else "is one number")
     if array.shape != shape:
         allowed = f"shape {shape}" if shape else "one number"
@@ -82,7 +89,7 @@ def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """`value` as a float64 array of exactly `shape`, all finite."""
+    """Convert `value` to a float64 array of exactly this `shape` with finite numbers; an error calls it `field`."""
     array = shaped(value, shape, field)
     if not np.isfinite(array).all():
         raise _not_finite(array, field)
@@ -90,11 +97,13 @@ def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarray:
-    """`value` for every world and body: float64 of `shape` (worlds, bodies, n), read-only if equal for all.
+    """Expand `value` to n numbers for every world and body: a float64 array of `shape` (worlds, bodies, n).
 
-    Allowed are (worlds, bodies, n), and (bodies, n) for all worlds alike. Of one body the axis of bodies may be left
-    out: (n,) for all worlds alike, (worlds, n) a row for each world. Of several bodies two axes are always (bodies, n),
-    whatever the number of worlds.
+    An error calls the argument `field`.
+
+    Allowed are (worlds, bodies, n), and (bodies, n) for all worlds alike. With one body the axis of bodies may be left
+    out: (n,) for all worlds alike, (worlds, n) a row for each world. With several bodies two axes are always (bodies,
+    n), whatever the number of worlds. A value for all worlds alike becomes a read-only view.
     """
     worlds, bodies, size = shape
     array = _real(value)
@@ -113,14 +122,15 @@ def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarr
 
 
 def _given(array: np.ndarray) -> str:
-    """Array of a wrong shape, in words for a message."""
+    """Describe an array of a wrong shape for a message: ``has shape ...``, or ``is ...`` for a single number."""
     return f"has shape {array.shape}" if array.ndim else f"is {shown(array)}"
 
 
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
-    """Copy `value` to `target`, a contiguous float64 array (worlds, bodies, n); `value` as in `batch`, all finite.
+    """Copy `value` into `target`, a contiguous float64 array (worlds, bodies, n), and check that it is finite.
 
-    The copy and the check are one pass, for arrays of every step. After an error `target` is changed, too.
+    `value` may have all shapes that `batch` allows; an error calls it `field`, and leaves `target` overwritten. Copy
+    and check take one pass, since every step makes this call.
     """
     if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
         array = value
@@ -140,7 +150,11 @@ def _not_finite(array: np.ndarray, field: str) -> ValueError:
 
 
 def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> ValueError:
-    """Error about an array of numbers that are not all `good`; for a long one it shows the first bad number."""
+    """Make the error about an array in which `good` is False somewhere; of a long array it shows the first such number.
+
+    `good` is a bool array of the same shape. The message calls the array `field` and ends with "allowed" and the words
+    `allowed`.
+    """
     if array.size <= 9:
         return ValueError(f"{field} is {shown(array)}; allowed {allowed}")
     place = np.unravel_index(int(np.argmin(good)), array.shape)
@@ -148,7 +162,7 @@ def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> Value
 
 
 def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
-    """`value` as a finite float64 array of any number of rows of `width`."""
+    """Convert `value` to a finite float64 array (n, `width`) with any number n of rows; an error calls it `field`."""
     array = floats(value, field, f"are rows of {width} numbers")
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"{field} {_given(array)}; allowed are rows of {width} numbers")
@@ -156,12 +170,12 @@ def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
 
 
 def number(value: ArrayLike, field: str) -> float:
-    """A finite float."""
+    """Convert `value` to a float, which must be finite; an error calls it `field`."""
     return float(finite(value, (), field))
 
 
 def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Finite and greater than zero."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers above 0; an error calls it `field`."""
     array = finite(value, shape, field)
     if not (array > 0).all():
         raise _bad(array, array > 0, field, "are numbers greater than 0")
@@ -169,7 +183,7 @@ def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray
 
 
 def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Finite and at least zero."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers from 0 on; an error calls it `field`."""
     array = finite(value, shape, field)
     if not (array >= 0).all():
         raise _bad(array, array >= 0, field, "are numbers of at least 0")
@@ -177,7 +191,7 @@ def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.nda
 
 
 def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Finite and between zero and one."""
+    """Convert `value` to a float64 array of this `shape` with numbers from 0 to 1; an error calls it `field`."""
     array = finite(value, shape, field)
     good = (array >= 0) & (array <= 1)
     if not good.all():
@@ -186,7 +200,10 @@ def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> int:
-    """An integer from `least` to `most`; None: of any size."""
+    """Convert `value` to an int, which must be an integer from `least` to `most`; an error calls it `field`.
+
+    `most` None sets no upper limit.
+    """
     if type(value) is int and least <= value and (most is None or value <= most):
         return value
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
@@ -197,7 +214,7 @@ def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> in
 
 
 def index(value: int, count: int, field: str) -> int:
-    """Index of one of `count` things, from 0."""
+    """Convert `value` to an int, which must be an index from 0 to `count` - 1; an error calls it `field`."""
     is_integer = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_integer or not 0 <= value < count:
         raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}")
@@ -205,7 +222,11 @@ def index(value: int, count: int, field: str) -> int:
 
 
 def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> str:
-    """One of the `names`; the message lists the nearest first, and further allowed values, `besides`."""
+    """Return `value`, which must be one of `names`.
+
+    The message of an error calls the argument `field` and lists the names, the nearest first. It ends with `besides`,
+    words about further allowed values.
+    """
     names = list(names)
     if not isinstance(value, str) or value not in names:
         order = nearest_first(value, names) if isinstance(value, str) else names
@@ -214,21 +235,27 @@ def one_of(value: str, names: Iterable[str], field: str, besides: str = "") -> s
 
 
 def instance(value: object, kind: type, field: str, name: str):
-    """`value`, which must be an instance of `kind`, called `name` in the message."""
+    """Return `value`, which must be an instance of the class `kind`.
+
+    The message of an error calls the argument `field`, and the class `name`.
+    """
     if not isinstance(value, kind):
         raise ValueError(f"{field} is {shown(value)}; allowed is {name}")
     return value
 
 
 def path(value: str | os.PathLike, field: str = "path"):
-    """A path as it is given."""
+    """Return `value`, which must be the path of a file: a str or a `Path`, not empty; an error calls it `field`."""
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
         raise ValueError(f"{field} is {shown(value)}; allowed is the path of a file, a str or a Path")
     return value
 
 
 def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Quaternions (w, x, y, z) of length 1 within `UNIT_TOLERANCE`, normalised to rounding."""
+    """Convert `value` to quaternions (w, x, y, z) of this `shape` (..., 4), normalised to rounding.
+
+    Their norms must be 1 within `UNIT_TOLERANCE`; an error calls the argument `field`.
+    """
     array = finite(value, shape, field)
     length = np.linalg.norm(array, axis=-1, keepdims=True)
     off = np.abs(length - 1)
@@ -243,5 +270,8 @@ def unit_quaternion(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.
 
 
 def unit(array: np.ndarray, length: Any) -> np.ndarray:
-    """`array` divided by its `length`, or unchanged if that is 1 to rounding, so that a repetition changes nothing."""
+    """Divide `array` by its `length`, unless that is 1 to rounding: then the array is returned unchanged.
+
+    So a second normalisation changes no bit.
+    """
     return np.where(np.abs(length - 1) <= UNIT_ROUNDING, array, array / length)

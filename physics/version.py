@@ -1,4 +1,4 @@
-"""Version of the installed package, or of the sources."""
+"""Version of rigid-env: of the source tree if it runs from one, else of the installed distribution."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from functools import cache
 from pathlib import Path
 
-# Name of the distribution, which is not that of a package in it.
+# Name of the distribution; the packages in it have other names.
 NAME = "rigid-env"
 
 UNKNOWN = "0+unknown"
@@ -14,9 +14,10 @@ UNKNOWN = "0+unknown"
 
 @cache
 def version() -> str:
-    """Version of `NAME`: from the sources' pyproject.toml if it lies beside this package, else from the installation.
+    """Version of the distribution `NAME`: that of pyproject.toml beside this package, else of the installed one.
 
-    The sources come first: if they are on the path, an installed version may be another one.
+    If Python runs from a source tree, another version may be installed; so pyproject.toml comes first. `UNKNOWN` is
+    returned where neither is found.
     """
     return _of_sources(Path(__file__).parents[1] / "pyproject.toml") or _of_installation()
 

@@ -1,1 +1,1 @@
-"""Energies, trajectories, and the exercises of the course notes."""
+"""Analysis of simulations: trajectories, energies and momenta, events, and exercises of the course notes."""

@@ -1,4 +1,4 @@
-"""Contact points and forces of a run, at its samples."""
+"""Contact points and forces at the samples of a trajectory."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from physics.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class ContactSamples:
-    """Contacts of all samples, one row each, in the order of time.
+    """Contacts at all samples of a trajectory, a row for each contact, in the order of time.
 
     Attributes
     ----------
     t : (n,) float64
         Time of the sample [s].
     body, wall, other : (n,) int64
-        The body that `force` acts on, and the wall or the other body that it comes from; -1: none.
+        Index of the body on which `force` acts, and of the wall or the other body that exerts it; -1: none.
     point, force : (n, 3) float64
-        World frame [m] and [N]: the force averages over the last step before the sample, collisions apart.
+        Contact point [m] and force [N], world frame. The force is the mean over the last step before the sample,
+        without collisions.
     """
 
     t: np.ndarray
@@ -44,18 +45,21 @@ class ContactSamples:
 
 
 NAMES = ("t", "body", "wall", "other", "point", "force")
-"""Arrays of `ContactSamples`."""
+"""Names of the arrays of `ContactSamples`."""
 
 
 def contacts_of(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ends (n, 2), points (n, 3) and forces (n, 3) of the last step of world 0; see `World.contacts`."""
+    """Contacts of the last step of world 0: ends (n, 2), points (n, 3) [m] and forces (n, 3) [N].
+
+    See `World.contact_ends` and `World.contacts`.
+    """
     return world.contact_ends(), *world.contacts()
 
 
 def contact_samples(
     times: Sequence[float], found: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]]
 ) -> ContactSamples:
-    """Join the results of `contacts_of` at these times."""
+    """Join results `found` of `contacts_of` at several times [s] into one object."""
     ends, points, forces = (np.concatenate(parts) for parts in zip(*found))
     t = np.repeat(np.asarray(times, dtype=np.float64), [len(each) for each, _, _ in found])
     body, end = ends[:, 0], ends[:, 1]

@@ -1,4 +1,4 @@
-"""Energy, momenta and gaps of a world, for users; no step reads them."""
+"""Diagnostics of a world: energy, momenta and gaps, computed on demand."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from physics.world.world import World
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Energy, momenta and gaps per world and body, shape (worlds, bodies) or (worlds, bodies, 3)."""
+    """Energy, momenta and gaps of each body of each world: arrays (worlds, bodies) or (worlds, bodies, 3)."""
 
     kinetic_energy: np.ndarray  # [J]
-    potential_energy: np.ndarray  # [J]: of gravity (0 at the origin), springs of contact, and fields that have one
+    potential_energy: np.ndarray  # [J], of gravity (0 at the origin), contact springs, and fields with a potential
     momentum: np.ndarray  # [kg m/s], world frame
     angular_momentum: np.ndarray  # about the centre of mass [kg m²/s], world frame
     gap: np.ndarray  # smallest distance to a wall [m], negative when penetrating, inf without walls
@@ -43,15 +43,15 @@ class Diagnostics:
 
     @property
     def energy(self) -> np.ndarray:
-        """Kinetic and potential energy [J], (worlds, bodies)."""
+        """Sum of kinetic and potential energy of each body [J], (worlds, bodies)."""
         return self.kinetic_energy + self.potential_energy
 
 
 def diagnose(world: World) -> Diagnostics:
-    """Return energy, momenta and gaps of every body of `world` now.
+    """Compute energy, momenta and gaps of every body of `world` in its present state.
 
-    Kinetic energy is ½ P·v + ½ L·ω. Potential energy is -m g·x, plus the energies of fields (`Field.energy`) and of the
-    springs of contact.
+    Kinetic energy is ½ P·v + ½ L·ω. Potential energy is -m g·x, plus the energies of fields (`Field.energy`) and of
+    contact springs (`Contact.stiffness`).
     """
     validation.instance(world, World, "world", "a physics.World")
     return _diagnose(world)
@@ -82,7 +82,7 @@ def _diagnose(world: World) -> Diagnostics:
 
 
 def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """Return loads and energies of the scene's fields now.
+    """Compute loads and potential energies of the scene's force fields in the present state of `world`.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
-    """Do `look_at` in the workspace of a step; no step may be taken meanwhile."""
+    """Do the work of `look_at`, in the workspace of a step: the caller must have exclusive use of the world."""
     wrenches, energies = np.zeros((len(world.state), 6)), np.zeros(len(world.state))
     if world.plan.fields:
         arrays = world.state, world.params, world.shapes

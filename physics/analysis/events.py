@@ -1,4 +1,4 @@
-"""Events of a run, from a world's log and from changes of its contacts."""
+"""Events of a simulated world, from the log of its steps and from changes of its contacts between samples."""
 
 from __future__ import annotations
 
@@ -10,46 +10,47 @@ from physics.kernels.time_stepping import event_log
 from physics.world.contacts import contacts_of_world
 from physics.world.world import World
 
-# A body, and the other one or -1 - k for wall k.
+# Index of a body, and that of the other body, or -1 - k for wall k.
 Pair = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Event:
-    """Event of a body, at a wall, with another body or alone.
+    """Event of a body: at a wall, with another body, or alone.
 
-    An ``impact`` is one event for each pair of bodies, or body and wall, however many contacts they have: `impulse` is
-    the sum over these. The change of a body's momentum by impacts is the sum of `impulse` over the events of which it
-    is the `body`, less that over those of which it is the `other`.
+    An ``impact`` is one event for each pair of bodies, or of a body and a wall; `impulse` is the sum over all their
+    contacts. The change of a body's momentum by impacts is the sum of `impulse` over the events in which it is `body`,
+    less the sum over the events in which it is `other`.
 
     Attributes
     ----------
     t : float
-        When [s]. The event-driven scheme knows it to rounding; where it has left out the end of a sequence of ever
-        smaller bounces, the contact's ``touch`` and the body's ``rest`` come when that would have ended. Time
-        stepping knows the moment of an ``impact``; of the other kinds the sample interval. `t` is its end, but for a
-        ``release``, which comes at the end of the last one in which the contact pushed.
+        Time of the event [s]. The event-driven scheme finds it to rounding. It leaves out the end of a sequence of ever
+        smaller bounces; ``touch`` and ``rest`` then have the time at which that sequence would have ended. Time
+        stepping finds the time of an ``impact``; for other kinds only the interval between two samples is known. `t`
+        is the end of this interval; for a ``release``, the end of the last interval in which the contact pushed.
     kind : str
-        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (one ended), ``fault``; of
-        the event-driven scheme also ``stick`` and ``slip`` (a resting contact ceased or began to slide) and
-        ``rest`` (the body came to rest). What time stepping meets so slowly that loads could have made it as fast
-        within a step is a ``touch`` without an ``impact``.
+        ``impact`` (velocities jumped), ``touch`` (a resting contact began), ``release`` (a resting contact ended) or
+        ``fault`` (see `StepReport.faults`). The event-driven scheme also has ``stick`` and ``slip`` (a resting contact
+        ceased or began to slide) and ``rest`` (the body came to rest). In time stepping an approach so slow that loads
+        could cause it within one step is a ``touch`` without an ``impact``.
     body : int
+        Index of the body.
     wall : int
-        -1 where the kind has none, and where bodies meet.
+        Index of the wall; -1 where the event has none.
     impulse : (3,) tuple of float
-        Of an ``impact``, on the `body`, world frame [N s]; zero for the other kinds.
+        Impulse of an ``impact`` on `body`, world frame [N s]; zero for other kinds.
     other : int
-        The other body where two meet, which gets the opposite impulse; -1: none.
+        Index of the other body, which gets the opposite impulse; -1: none.
     point : (3,) tuple of float
-        Of an ``impact``: the point of `body` where the impulse acts, of several contacts the mean weighted by their
-        normal impulses, world frame [m]. On a face the impulse acts there with the moment of all contacts but for
-        what friction exerts about the normal. Zero for the other kinds.
+        Point of `body` at which the impulse of an ``impact`` acts, world frame [m]; of several contacts the mean,
+        weighted by their normal impulses. On a face the impulse at this point has the moment of all contacts, except
+        the moment of friction about the normal. Zero for other kinds.
     normal : (3,) tuple of float
-        Of an ``impact``: unit normal out of the wall or of the other body towards `body`, of several contacts the
-        weighted mean, world frame. Zero for the other kinds.
+        Unit normal of an ``impact``, out of the wall or of the other body towards `body`, world frame; of several
+        contacts the weighted mean. Zero for other kinds.
     name, other_name : str
-        Of `body` and of `other` in the scene; "" where they have none.
+        Names of `body` and of `other` in the scene; "" for a body without a name.
     """
 
     t: float
@@ -67,12 +68,12 @@ class Event:
 
 
 def logged_events(world: World, start: float) -> list[Event]:
-    """Events of the last call of a step that fitted into the log, in the order of time.
+    """Read the events of the last kernel call from the log, in the order of time; events without room are missing.
 
     Parameters
     ----------
     world : World
-        Of one world; `World.make_event_room` has made room.
+        Batch of one world, in which `World.make_event_room` has made room.
     start : float
         Time at which that call began [s].
     """
@@ -90,7 +91,7 @@ def logged_events(world: World, start: float) -> list[Event]:
 
 
 def named(events: list[Event], names: Sequence[str]) -> list[Event]:
-    """Events with the names of their bodies; `names` has "" for a body without one."""
+    """Add the names of their bodies to events; `names` has a name for each body of the scene, or ""."""
     if not any(names):
         return events
     known = dict(enumerate(names))
@@ -98,21 +99,22 @@ def named(events: list[Event], names: Sequence[str]) -> list[Event]:
 
 
 def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pair, float]:
-    """Time at which each resting contact of world 0 last pushed, as known at the time t.
+    """Find the last sample at which each present contact of world 0 pushed.
 
     Parameters
     ----------
     world : World
+        World after a step.
     before : dict
-        What this function has returned at the sample before; empty at the first one.
+        Result of this function at the sample before; empty at the first sample.
     t : float
-        Now [s].
+        Time of the present sample [s].
 
     Returns
     -------
     dict
-        From body, and other body or -1 - k for wall k, to a time [s]. Contacts that have not pushed yet are left out:
-        bodies that leave each other after an impact do not rest.
+        Time of the last push [s] for each pair (body, other body or -1 - k for wall k). Contacts that have never pushed
+        are left out: bodies that leave each other after an impact do not rest.
     """
     found = contacts_of_world(world, 0)
     touching = [(int(body), int(other)) for body, other in found.ends[0]]
@@ -121,9 +123,10 @@ def last_pushes(world: World, before: Mapping[Pair, float], t: float) -> dict[Pa
 
 
 def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: float) -> list[Event]:
-    """Contacts that began and ended between two samples, from `last_pushes` at both; the later sample is at t [s].
+    """Make ``touch`` and ``release`` events for the contacts that began and ended between two samples.
 
-    A contact ends at its last push. It stays in the set after that until its gap exceeds the slop.
+    `before` and `now` are the results of `last_pushes` at both samples; the later sample is at `t` [s]. A ``release``
+    has the time of the contact's last push, although the contact stays in these results until its gap exceeds the slop.
     """
     began = [("touch", pair, t) for pair in now.keys() - before.keys()]
     ended = [("release", pair, before[pair]) for pair in before.keys() - now.keys()]
@@ -135,6 +138,6 @@ def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: f
 
 
 def fault_events(world: World, t: float) -> list[Event]:
-    """Fault of the last step of world 0, as events: one or none; `t` is the end of that step [s]."""
+    """Make the ``fault`` event of the last step of world 0, a list of one or none; `t` is the end of the step [s]."""
     report = world.report
     return [Event(t, "fault", int(report.fault_body[0]))] if report.faults[0] else []

@@ -1,4 +1,4 @@
-"""The linear complementarity problem with checked arguments and an explained result."""
+"""Linear complementarity problem: solution by a pivoting method, with checked arguments and an explained result."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from physics.kernels.lcp.dantzig import dantzig, dantzig_sizes
 from physics.kernels.lcp.lemke import lemke, lemke_sizes
 
 METHODS = ("lemke", "dantzig")
-PIVOTS_PER_UNKNOWN = 50  # a few are usual; worst cases take 2^n and are left to the caller's max_pivots
-PSD_TOLERANCE = 2.0**-46  # times n and the largest entry: what rounding may do to symmetry and eigenvalues
+PIVOTS_PER_UNKNOWN = 50  # a few are usual; worst cases take 2^n, for which a caller sets max_pivots
+PSD_TOLERANCE = 2.0**-46  # rounding error of symmetry and eigenvalues, relative to n times the largest entry
 
 
 class LcpStatus(IntEnum):
-    """End of a pivoting solver. `message` gives advice."""
+    """Outcome of a pivoting solver; `message` explains it."""
 
     SOLVED = scaling_and_certificate.LCP_SOLVED
     RAY = scaling_and_certificate.LCP_RAY
@@ -27,7 +27,7 @@ class LcpStatus(IntEnum):
 
     @property
     def message(self) -> str:
-        """Explanation of the status, and advice."""
+        """Explanation of the status in words, and advice."""
         return _MESSAGES[self]
 
 
@@ -56,10 +56,11 @@ class LcpResult:
     Attributes
     ----------
     z, w : (n,) float64
-        z is zero unless the status is `SOLVED` or `INACCURATE`. w = M z + q, as computed.
+        Solution; z is zero unless the status is `SOLVED` or `INACCURATE`. w = M z + q, as computed.
     status : LcpStatus
-        `status.message` says what to do.
+        Outcome; `status.message` explains it.
     pivots : int
+        Number of pivots.
     residual : float
         Natural map max |min(z, w)|; zero exactly at solutions.
     """
@@ -77,23 +78,27 @@ def lcp(M, q, method: str = "lemke", max_pivots: int | None = None) -> LcpResult
     Parameters
     ----------
     M : (n, n) array_like
+        Matrix of the problem.
     q : (n,) array_like
+        Vector of the problem.
     method : {"lemke", "dantzig"}
-        "lemke" takes any M, and decides every problem whose M is positive
-        semidefinite or otherwise copositive-plus. "dantzig" is faster and takes
-        symmetric positive semidefinite M only, as in frictionless contact.
+        "lemke" takes any M. If M is positive semidefinite, or more generally
+        copositive-plus, it finds a solution or shows that there is none. "dantzig"
+        is faster and takes symmetric positive semidefinite M only, as in
+        frictionless contact.
     max_pivots : int, optional
-        By default 50 (n + 1).
+        Largest number of pivots; None: 50 (n + 1).
 
     Returns
     -------
     LcpResult
+        Solution and outcome.
 
     Raises
     ------
     ValueError
-        If shapes do not fit, an entry is not finite, the method is unknown or
-        does not take this M, or max_pivots is negative.
+        Shapes do not fit, an entry is not finite, the method is unknown or does not
+        take this M, or max_pivots is negative.
 
     References
     ----------

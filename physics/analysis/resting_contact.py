@@ -1,12 +1,12 @@
-"""Resting contact at the level of accelerations, as the course notes pose it.
+"""Resting contact at the level of accelerations, as the course notes of Witkin and Baraff pose the problem.
 
 For the contacts of a body that touch and do not move apart, the normal forces f and the normal accelerations a of
 the contact points are complementary,
 
     a = A f + b,    a >= 0,    f >= 0,    fᵀa = 0,
 
-with A = J M⁻¹ Jᵀ and b the accelerations without contact forces. The step solves the velocity-level twin in
-impulses; this is the notes' own problem, without friction, for looking at and for teaching.
+with A = J M⁻¹ Jᵀ and b the accelerations without contact forces. The time-stepping schemes solve the similar problem
+of impulses and velocities. This module solves the problem of the notes, without friction, for analysis and teaching.
 
 Source: Baraff and Witkin, *Physically Based Modeling* (SIGGRAPH course notes, 1997), "Rigid Body Simulation II",
 section 9, and Baraff, *Fast contact force computation for nonpenetrating rigid bodies*, SIGGRAPH 1994.
@@ -29,7 +29,7 @@ from physics.world.world import World
 
 @dataclass(frozen=True)
 class RestingContact:
-    """The problem and its solution for one body with n contacts."""
+    """Acceleration-level contact problem of one body with n contacts, and its solution."""
 
     points: np.ndarray  # (n, 3) contact points, world frame [m]
     normals: np.ndarray  # (n, 3) out of the walls
@@ -43,27 +43,30 @@ class RestingContact:
 def resting_contact(
     world: World, index: int = 0, body: int = 0, wrench: ArrayLike | None = None, gap: float | None = None
 ) -> RestingContact:
-    """Contact forces of a body that rests or slides without friction on walls, by Dantzig's pivoting.
+    """Contact forces of a body that rests or slides without friction on walls, by Dantzig's method.
 
     Parameters
     ----------
     world : World
+        Batch with the body, in its present state.
     index, body : int
-        Which world of the batch, which body of the scene.
+        Index of the world in the batch, and of the body in the scene.
     wrench : (6,) array_like, optional
-        Force [N] and torque [N m] on the body, world frame.
+        Force [N] and torque about the centre of mass [N m] on the body, world frame; None: none.
     gap : float, optional
-        Features up to this distance from a wall count as contacts [m]; None: the world's own slop, ten times.
+        Largest distance from a wall at which a feature counts as a contact [m]; None: ten times the world's slop.
 
     Returns
     -------
     RestingContact
-        Features that move away from their wall (normal velocity > 0 beyond rounding) are not contacts.
+        Problem and solution. Features that move away from their wall (normal velocity > 0 beyond rounding) are no
+        contacts.
 
     Raises
     ------
     ValueError
-        An index out of range, a wrench of the wrong shape or not finite, or a world whose bodies touch each other.
+        An index out of range, a wrench of the wrong shape or not finite, a body that is a hull, or a scene whose bodies
+        touch each other.
     """
     if not (0 <= index < world.worlds and 0 <= body < world.body_count):
         raise ValueError(
@@ -94,7 +97,7 @@ def resting_contact(
 
 
 def _inverse_inertia(row: np.ndarray, params: np.ndarray) -> np.ndarray:
-    """I⁻¹ in the world frame, (3, 3) [1/(kg m²)]."""
+    """Inverse inertia (3, 3) in the world frame [1/(kg m²)] of a body with this row of state and of parameters."""
     R = _matrix(row[at.QUAT : at.QUAT + 4]) @ _matrix(params[at.PRINCIPAL : at.PRINCIPAL + 4])
     return R @ np.diag(params[at.INV_INERTIA : at.INV_INERTIA + 3]) @ R.T
 
@@ -106,11 +109,14 @@ def _matrix(q: np.ndarray) -> np.ndarray:
 
 
 def _touching(world: World, i: int, gap: float, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Arms (n, 3) and normals (n, 3) of the features within `gap` of a wall that do not move away from it."""
+    """Contact arms (n, 3) [m] and normals (n, 3) of the features within `gap` [m] of a wall that do not leave it.
+
+    The body has the row `i` of the state, velocity `v` [m/s] and angular velocity `w` [rad/s].
+    """
     arms, normals = [], []
     features = at.VERTEX_COUNT if world.shapes[i % world.body_count] == at.BLOCK else 1
     position, radius = world.state[i, at.POS : at.POS + 3], world.params[i, at.RADIUS]
-    # What rounding of v and of ω x r may leave of a normal velocity that is zero.
+    # Rounding error of a normal velocity v·n + (ω x r)·n that should be zero.
     rounding = 1e-9 * (np.linalg.norm(v) + radius * np.linalg.norm(w))
     for k, wall in enumerate(world.walls):
         n = wall[at.WALL_NORMAL : at.WALL_NORMAL + 3]

@@ -1,4 +1,4 @@
-"""Simulate a scene for a while and keep samples and events."""
+"""Simulation of one world of a scene, with samples of its states and contacts, and its events."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from physics.scene.scene import Scene
 from physics.world.report import StepReport, add_report
 from physics.world.world import World
 
-# Samples further apart than this share of sample_dt from the last one are a sample of their own at the end.
+# The end of the simulation gets a sample of its own if it is further than this share of sample_dt from the last sample.
 LAST_SAMPLE = 1e-9
 
-# Time between samples where neither it nor the step is given [s].
+# Time between samples [s] if a caller gives neither `sample_dt` nor `dt`.
 SAMPLE_DT = 0.01
 
-# Samples at most: of one body they take more than ten gigabytes.
+# Largest number of samples; with one body so many take more than ten gigabytes.
 MOST_SAMPLES = 100_000_000
 
-# Events per body that a step has room for at first; one with more is taken again with more room.
+# Events of a body for which a step has room at first; a step with more events is repeated with more room.
 EVENT_ROOM = 16
 
 
@@ -44,27 +44,30 @@ def simulate(
     wrench: ArrayLike | Callable[[float, World], ArrayLike] | None = None,
     dt: float | None = None,
 ) -> Trajectory:
-    """Advance one world of a scene and sample it.
+    """Simulate one world of a scene, and keep samples of it and its events.
 
     Parameters
     ----------
     scene : Scene
+        Scene to simulate.
     duration : float
-        [s].
+        Length of the simulation [s].
     accuracy : str or Accuracy
-        See `World`.
+        Name of a preset, or settings, as in `World`.
     sample_dt : float, optional
-        Samples are taken at 0, sample_dt, 2 sample_dt, ... up to and with `duration` [s]. None: `dt`, or 0.01.
+        Time between samples [s]: they are taken at 0, sample_dt, 2 sample_dt, ..., and at `duration`. None: `dt` if
+        given, else 0.01.
     wrench : (bodies, 6) array_like or callable, optional
-        Force [N] and torque about the centre of mass [N m], world frame, all the time; of a scene of one body also
-        (6,). Or (t, world) -> such a wrench, held until the next sample.
+        Force [N] and torque about the centre of mass [N m], world frame, constant; with one body also (6,). Or a
+        function (t, world) that returns such a wrench at each sample, which acts until the next one.
     dt : float, optional
-        The engine's step, of which `sample_dt` is a whole multiple [s]. None: `sample_dt`. A last interval that is
-        shorter than `sample_dt` is cut into equal steps of at most this.
+        Length of a step of the engine [s]; `sample_dt` must be a whole multiple of it. None: `sample_dt`. If the last
+        interval is shorter than `sample_dt`, it is cut into equal steps of at most `dt`.
 
     Returns
     -------
     Trajectory
+        Samples, events, contacts and reports.
 
     Raises
     ------
@@ -100,7 +103,7 @@ def simulate(
 
 
 def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
-    """Check duration, sample interval and step [s], with defaults in place of None."""
+    """Check duration, time between samples and step [s]; return them with defaults in place of None."""
     duration = float(validation.non_negative(duration, (), "duration"))
     if dt is not None:
         dt = float(validation.positive(dt, (), "dt"))
@@ -119,7 +122,7 @@ def _times(duration, sample_dt, dt) -> tuple[float, float, float]:
 
 
 def _loads(wrench, world: World) -> Callable[[float], np.ndarray | None]:
-    """Return a function of the time [s] that gives the wrench (1, bodies, 6), or None."""
+    """Make a function of the time [s] that returns the wrench (1, bodies, 6) at that time, or None for no wrench."""
     shape = (1, world.body_count, 6)
     if wrench is None:
         return lambda t: None
@@ -130,7 +133,7 @@ def _loads(wrench, world: World) -> Callable[[float], np.ndarray | None]:
 
 
 def _interval(world: World, watch, start: float, end: float, load, steps: int, dt: float | None):
-    """Take the steps between two samples: their events, and the report of all of them."""
+    """Make the `steps` steps of `dt` [s] between two samples; return their events and the report of all of them."""
     if steps == 1 or world.actuation is None or not world.actuation.actuator.remembers:
         events = watch(world, start, end, partial(world.step, load, steps, dt))
         return events, world.report
@@ -150,13 +153,13 @@ def _sample(world: World) -> tuple[np.ndarray, ...]:
 
 
 class _Touching:
-    """Finder of events in time stepping: impacts from the log, others from contacts and faults at the samples."""
+    """Events of time-stepping schemes: impacts come from the log, other kinds from contacts and faults at samples."""
 
     def __init__(self):
         self._pushes: dict[Pair, float] = {}
 
     def __call__(self, world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
-        """Take a step and return its events."""
+        """Make the steps from `start` to `end` [s] by calling `step`; return their events."""
         events = _logged(world, start, end, step)
         before, self._pushes = self._pushes, last_pushes(world, self._pushes, end)
         events += contact_events(before, self._pushes, end) + fault_events(world, end)
@@ -164,7 +167,10 @@ class _Touching:
 
 
 def _logged(world: World, start: float, end: float, step: Callable[[], StepReport]) -> list[Event]:
-    """Take a step; return its log, for which the step is repeated with more room if necessary."""
+    """Make steps from `start` [s] by calling `step`; return the logged events.
+
+    If the log had no room for some event, the world is restored and steps again with more room.
+    """
     before = world.snapshot()
     step()
     most = int(world.event_counts.max())

@@ -1,4 +1,4 @@
-"""Samples, events and contacts of a run as columns, for files and for pandas."""
+"""Samples, events and contacts of a trajectory as tables, for CSV files and for pandas."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 TABLES = ("samples", "events", "contacts")
 
-# Columns of the vectors of a sample.
+# Names of the columns for the components of each vector of a sample.
 VECTORS = {
     "pos": ("x", "y", "z"),
     "quat": ("qw", "qx", "qy", "qz"),
@@ -30,12 +30,19 @@ Columns = dict[str, np.ndarray | list]
 
 
 def columns_of(trajectory: Trajectory, what: str) -> Columns:
-    """Columns of one of `TABLES`, by name and of equal length.
+    """Make a table of a trajectory: columns of equal length by name.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Trajectory to read.
+    what : {"samples", "events", "contacts"}
+        Contents of the table: a row for each sample of each body, for each event, or for each contact at each sample.
 
     Raises
     ------
     ValueError
-        No such table, or a trajectory whose contacts are not known.
+        `what` is another word, or the trajectory does not know its contacts.
     """
     validation.one_of(what, TABLES, "what")
     if what == "samples":
@@ -50,7 +57,7 @@ def columns_of(trajectory: Trajectory, what: str) -> Columns:
 
 
 def write_csv(path: str | Path, columns: Columns) -> None:
-    """Write columns as comma-separated values; a float has all its digits."""
+    """Write a table as a file of comma-separated values, floats with all digits."""
     lists = [column.tolist() if isinstance(column, np.ndarray) else column for column in columns.values()]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)

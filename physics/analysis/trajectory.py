@@ -1,4 +1,4 @@
-"""Samples of a run of one world, and their files."""
+"""Trajectory: samples and events of a simulation of one world, their files, tables and pictures."""
 
 from __future__ import annotations
 
@@ -30,30 +30,32 @@ from physics.scene.scene import Scene
 from physics.summary import counted, parts_repr
 from physics.world.report import Status, StepReport
 
-# Numbers of a sample of one body.
+# Shape of each number or vector of one body at one sample.
 TAILS: dict[str, tuple[int, ...]] = {"pos": (3,), "quat": (4,), "linvel": (3,), "angvel": (3,), "energy": ()}
 SAMPLES = ("t", *TAILS)
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Samples of one world.
+    """Samples and events of a simulation of one world; ``trajectory["crate"]`` selects one body.
 
     Attributes
     ----------
     t : (samples,) float64
-        [s].
+        Times of the samples [s].
     pos, quat, linvel, angvel : (samples, bodies, 3|4|3|3) float64
-        World frame; see `World`.
+        States of the bodies in the world frame [m, 1, m/s, rad/s].
     energy : (samples, bodies) float64
-        Kinetic and potential [J].
+        Sum of kinetic and potential energy [J].
     events : tuple of Event
+        Events in the order of time.
     reports : tuple of StepReport
-        One per sample interval.
+        A report for each interval between samples.
     scene : Scene or None
-        The scene, if it is known; read from a file its bodies and walls, without effects.
+        The scene; None: unknown. In a trajectory read from a file it has bodies and walls, but no effects save
+        `Contact`.
     contacts : ContactSamples or None
-        Contact points and forces at the samples, if they are known.
+        Contact points and forces at the samples; None: unknown.
     """
 
     t: NDArray[np.float64]
@@ -68,7 +70,7 @@ class Trajectory:
     contacts: ContactSamples | None = field(default=None, compare=False)
 
     __repr__ = parts_repr
-    __iter__ = None  # `trajectory[body]` makes no sequence of it
+    __iter__ = None  # Python would else iterate by `trajectory[0]`, `trajectory[1]`, ...
 
     def _repr_html_(self) -> str:
         energy = self.energy.sum(axis=1)
@@ -82,7 +84,10 @@ class Trajectory:
         )  # fmt: skip
 
     def _why(self) -> str:
-        """Gravest status and the time of its first occurrence, for the `repr`; `messages` of the reports say more."""
+        """Words for the `repr` about the gravest status of all reports; "" if all are OK.
+
+        The words count the reports with this status, and name the first such report, whose `messages` explain it.
+        """
         met = [int(report.status[0]) for report in self.reports]
         worst = max(met, key=Status.severity, default=int(Status.OK))
         if worst == Status.OK:
@@ -92,18 +97,18 @@ class Trajectory:
 
     @property
     def ok(self) -> bool:
-        """True if the reports of all intervals are OK."""
+        """True if the reports of all intervals between samples are OK (`StepReport.ok`)."""
         return all(report.ok for report in self.reports)
 
     # --- bodies ------------------------------------------------------------------------------------------------
 
     def __getitem__(self, body: str | int) -> BodyTrajectory:
-        """Samples of one body, by its name or its index.
+        """Select the samples and events of one body, by its name or its index.
 
         Raises
         ------
         ValueError
-            No such body: names those there are, the nearest first.
+            No such body exists. The message lists the names of the bodies, the nearest first.
         """
         b = self._index(body)
         samples = {name: getattr(self, name)[:, b] for name in TAILS}
@@ -121,11 +126,11 @@ class Trajectory:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the bodies; "" for one without a name."""
+        """Names of the bodies; "" for a body without a name, or without a scene."""
         return ("",) * self.pos.shape[1] if self.scene is None else body_names(self.scene)
 
     def label(self, body: int) -> str:
-        """Name of a body, or its index."""
+        """Name of the body with index `body`, or ``body`` and the index if it has none."""
         return self.names[body] or f"body {body}"
 
     # --- tables and pictures -----------------------------------------------------------------------------------
@@ -136,18 +141,20 @@ class Trajectory:
         Parameters
         ----------
         path : str or Path
+            Path of the file to write.
         what : {"samples", "events", "contacts"}
-            A row for each sample of each body, for each event, or for each contact at each sample.
+            Contents: a row for each sample of each body, for each event, or for each contact at each sample.
         """
         validation.path(path)
         write_csv(path, columns_of(self, what))
 
     def to_pandas(self, what: str = "samples"):
-        """Return the same table as a `pandas.DataFrame`.
+        """Make a `pandas.DataFrame` with the same table that `to_csv` writes.
 
         Parameters
         ----------
         what : {"samples", "events", "contacts"}
+            Contents of the table, as in `to_csv`.
 
         Raises
         ------
@@ -158,17 +165,17 @@ class Trajectory:
         return load_optional("pandas", "Trajectory.to_pandas").DataFrame(columns)
 
     def plot(self, path: str | Path | None = None):
-        """Draw the motion over time: vectors of a single body; heights, speeds and spins of several.
+        """Draw the motion over time: of a single body its vectors; of several their heights, speeds and spins.
 
         Parameters
         ----------
         path : str or Path, optional
-            File to write, in a format that matplotlib knows by its ending.
+            Picture to write; its ending chooses a format of matplotlib. None: no file.
 
         Returns
         -------
         matplotlib.figure.Figure
-            A notebook shows it.
+            The picture, which a notebook shows.
 
         Raises
         ------
@@ -182,24 +189,26 @@ class Trajectory:
     # --- files -------------------------------------------------------------------------------------------------
 
     def to_npz(self, path: str | Path) -> None:
-        """Write samples, events, contacts, and the scene's bodies and walls as an archive; `from_npz` reads it."""
+        """Write samples, events, contacts, and the scene's bodies and walls to an ``.npz`` file for `from_npz`."""
         samples: Any = {name: getattr(self, name) for name in SAMPLES}
         rest: Any = {**event_arrays(self.events), **contact_arrays(self.contacts), **scene_arrays(self.scene)}
         np.savez(path, **samples, **rest)
 
     @classmethod
     def from_npz(cls, path: str | Path) -> Trajectory:
-        """Read a file of `to_npz`, without reports and without running code from the file.
+        """Read a trajectory that `to_npz` has written, without running code from the file.
+
+        The result has no reports. Files of earlier versions may lack events, contacts or a scene.
 
         Parameters
         ----------
         path : str or Path
-            An archive without events or a scene, of an earlier version, has none.
+            Path of the file.
 
         Raises
         ------
         ValueError
-            It is no trajectory, or a damaged one.
+            The file is no trajectory, or is damaged.
         OSError
             The file cannot be read.
         """
@@ -216,29 +225,29 @@ class Trajectory:
                 events = tuple(named(list(events_of(parts)), () if scene is None else body_names(scene)))
                 contacts = contacts_of_file(parts)
                 return cls(**samples, events=events, reports=(), scene=scene, contacts=contacts)
-            except Exception as error:  # whatever is wrong with it, it is none
+            except Exception as error:  # any fault means that the file is no trajectory
                 told = f"there is no {error}" if isinstance(error, KeyError) else error
                 raise ValueError(f"{path} is no trajectory ({told}); {allowed}") from None
 
 
 @dataclass(frozen=True, eq=False)
 class BodyTrajectory:
-    """Samples of one body of a trajectory: ``trajectory["crate"]``.
+    """Samples and events of one body of a trajectory, as ``trajectory["crate"]`` returns them.
 
     Attributes
     ----------
     body : int
-        Its index in the scene.
+        Index of the body in the scene.
     name : str
-        "" if it has none.
+        Name of the body; "" if it has none.
     t : (samples,) float64
-        [s].
+        Times of the samples [s].
     pos, quat, linvel, angvel : (samples, 3|4|3|3) float64
-        World frame; see `World`.
+        States of the body in the world frame [m, 1, m/s, rad/s].
     energy : (samples,) float64
-        Kinetic and potential [J].
+        Sum of kinetic and potential energy [J].
     events : tuple of Event
-        Those of this body, also where it is the other one.
+        Events in which the body is `Event.body` or `Event.other`.
     """
 
     body: int
@@ -262,16 +271,16 @@ class BodyTrajectory:
 
     @property
     def label(self) -> str:
-        """Name of the body, or its index."""
+        """Name of the body, or ``body`` and its index if it has none."""
         return self.name or f"body {self.body}"
 
     def plot(self, path: str | Path | None = None):
-        """Draw position, velocity, angular velocity and energy over time; see `Trajectory.plot`."""
+        """Draw position, velocity, angular velocity and energy of the body over time, as `Trajectory.plot` does."""
         return trajectory_plot.plot_body(self, path)
 
 
 def _checked(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Check the arrays of a file: matching shapes, rising times, finite numbers."""
+    """Check and return the sample arrays of a file: shapes must match, times increase, and numbers be finite."""
     shape = samples["energy"].shape
     if len(shape) != 2 or 0 in shape:
         raise ValueError(f"energy has shape {shape}")
@@ -285,7 +294,7 @@ def _checked(samples: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _matching(scene: Scene | None, samples: dict[str, np.ndarray]) -> Scene | None:
-    """Return the scene if it has as many bodies as the samples, else None."""
+    """Return the scene of a file, which may be None; ValueError if it has another number of bodies than the samples."""
     bodies = samples["pos"].shape[1]
     if scene is not None and len(scene.bodies) != bodies:
         raise ValueError(f"its scene has {len(scene.bodies)} bodies, its samples have {bodies}")

@@ -1,4 +1,4 @@
-"""Events and the shapes of a scene as plain arrays, for files of trajectories, and back."""
+"""Conversion of events, contacts and a scene's bodies and walls to plain arrays for trajectory files, and back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ EVENTS, CONTACTS, SCENE = "event_", "contact_", "scene_"
 
 
 def event_arrays(events: Sequence[Event]) -> dict[str, np.ndarray]:
-    """Arrays with a row for each event: time, kind, body with wall and other body, three vectors."""
+    """Convert events to arrays by name, with a row for each: time, kind, indices of body, wall and other, vectors."""
     vectors = [(event.impulse, event.point, event.normal) for event in events]
     return {
         f"{EVENTS}t": np.array([event.t for event in events], dtype=np.float64),
@@ -28,7 +28,7 @@ def event_arrays(events: Sequence[Event]) -> dict[str, np.ndarray]:
 
 
 def events_of(parts: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
-    """Events of a file; none where it has no such arrays."""
+    """Make events from the arrays of a file; an empty tuple if the file has none."""
     if f"{EVENTS}t" not in parts:
         return ()
     columns = (parts[f"{EVENTS}{name}"].tolist() for name in ("t", "kind", "ends", "vectors"))
@@ -39,12 +39,12 @@ def events_of(parts: Mapping[str, np.ndarray]) -> tuple[Event, ...]:
 
 
 def contact_arrays(contacts: ContactSamples | None) -> dict[str, np.ndarray]:
-    """Arrays with a row for each contact at each sample; empty where contacts are unknown."""
+    """Convert contacts to arrays by name, with a row for each contact at each sample; empty if they are unknown."""
     return {} if contacts is None else {f"{CONTACTS}{name}": getattr(contacts, name) for name in NAMES}
 
 
 def contacts_of_file(parts: Mapping[str, np.ndarray]) -> ContactSamples | None:
-    """Contacts of a file; None where it has no such arrays."""
+    """Make contacts from the arrays of a file; None if the file has none."""
     if f"{CONTACTS}t" not in parts:
         return None
     arrays = [parts[f"{CONTACTS}{name}"] for name in NAMES]
@@ -55,7 +55,7 @@ def contacts_of_file(parts: Mapping[str, np.ndarray]) -> ContactSamples | None:
 
 
 def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
-    """Bodies and walls of a scene without its effects; empty where the scene is unknown."""
+    """Convert the bodies of a scene, and the walls that act, to arrays by name; empty if the scene is unknown."""
     if scene is None:
         return {}
     corners = [body.polyhedron.vertices if body.kind == "hull" else np.zeros((0, 3)) for body in scene.bodies]
@@ -74,7 +74,7 @@ def scene_arrays(scene: Scene | None) -> dict[str, np.ndarray]:
 
 
 def scene_of(parts: Mapping[str, np.ndarray]) -> Scene | None:
-    """Bodies and walls of a file as a scene; None where it has no such arrays."""
+    """Make a scene from the bodies and walls in the arrays of a file; None if the file has none."""
     if f"{SCENE}kind" not in parts:
         return None
     names = ("kind", "mass", "inertia", "dimensions", "center")

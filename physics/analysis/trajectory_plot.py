@@ -1,4 +1,4 @@
-"""Pictures of a trajectory: its motion over time."""
+"""Pictures of a trajectory: motion and energy over time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,15 @@ DPI = 130
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6bb1", "#444444")
 MOST_LABELS = 12  # bodies that a legend names
 
-# Title, unit and lines of each panel of one body.
+# Title, unit and vector of each panel in the picture of one body.
 OF_ONE = (("position", "m", "pos"), ("velocity", "m/s", "linvel"), ("angular velocity", "rad/s", "angvel"))
 
 
 def plot_body(track: BodyTrajectory, path: str | Path | None) -> Any:
-    """Draw position, velocity, angular velocity and energy of one body, with its impacts as grey lines."""
+    """Draw position, velocity, angular velocity and energy of one body over time, with its impacts as grey lines.
+
+    `path` is the picture to write, or None. Returns the figure.
+    """
     figure, panels = _panels()
     for panel, (title, unit, name) in zip(panels, OF_ONE):
         for k, axis in enumerate("xyz"):
@@ -35,7 +38,10 @@ def plot_body(track: BodyTrajectory, path: str | Path | None) -> Any:
 
 
 def plot_bodies(trajectory: Trajectory, path: str | Path | None) -> Any:
-    """Draw height, speed and spin of each body, and the energy of all, with their impacts as grey lines."""
+    """Draw height, speed and spin of each body over time, and the energy of all, with impacts as grey lines.
+
+    `path` is the picture to write, or None. Returns the figure.
+    """
     figure, panels = _panels()
     numbers = (
         ("height y [m]", trajectory.pos[:, :, 1]),
@@ -61,7 +67,7 @@ def _panels():
 
 
 def _finish(figure, panels, title: str, impacts: list[float], columns: int) -> None:
-    """Draw impacts, grid, title and a legend above all panels; no columns: no legend."""
+    """Add impacts (times [s]), grid and title to all panels, and a legend of `columns` columns above; 0: no legend."""
     for panel in panels:
         panel.vlines(np.unique(impacts), 0, 1, transform=panel.get_xaxis_transform(), color="#cccccc", lw=0.6, zorder=0)
         panel.grid(True, color="#e6e6e6", linewidth=0.7)

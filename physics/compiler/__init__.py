@@ -1,1 +1,1 @@
-"""Compilers of kernels, which import nothing else of physics: decorators, caches of machine code."""
+"""Compilers of kernels: decorators, three compilers, and caches of machine code. It imports nothing else of physics."""

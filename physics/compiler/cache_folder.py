@@ -1,8 +1,7 @@
-"""Name the folder of compiled kernels after all of their sources.
+"""Folder of compiled kernels, named after a digest of all their sources.
 
-Numba's disk cache compares only the file in which a function stands. A kernel that calls a kernel of another file would
-go on using the old machine code after that other file was edited. Here an edit anywhere among the kernels starts a
-fresh folder.
+Numba's disk cache checks only the file that defines a function. A kernel that calls a kernel of another file would
+keep its old machine code after an edit of that file. Here an edit of any kernel's file leads to a new folder.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from physics.compiler.notices import warn
 
 
 def is_checked() -> bool:
-    """True if indices are checked: `NUMBA_BOUNDSCHECK=1`."""
+    """True if kernels check the indices of arrays: with the environment variable `NUMBA_BOUNDSCHECK=1`."""
     return os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
 
 
@@ -27,11 +26,12 @@ WRITABLE_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def is_owned_by_user(status: os.stat_result) -> bool:
-    """True if only this user or root owns and can write a file or folder; always so without such users.
+    """True if this user or root owns a file or folder, and nobody else may write to it.
 
     Parameters
     ----------
     status : os.stat_result
+        Status of the file or folder. On systems without user numbers (Windows) every file passes.
     """
     if not hasattr(os, "getuid"):
         return True
@@ -39,9 +39,11 @@ def is_owned_by_user(status: os.stat_result) -> bool:
 
 
 def _cache_root() -> Path | None:
-    """`NUMBA_CACHE_DIR` if it is set, else the user's cache folder, else a temporary one; None if none is usable.
+    """Folder for all compiled kernels; None if no folder is usable.
 
-    `fused` looks at each file before it reads it (`fused.disk_cache`), `numba` at the folder.
+    It is `NUMBA_CACHE_DIR` if that is set, else in the user's cache folder, else in the folder of temporary files.
+    Whether other users may write there is checked later: by `fused` for each file (`fused.disk_cache`), by `numba` for
+    the folder.
     """
     if os.environ.get("NUMBA_CACHE_DIR"):
         return Path(os.environ["NUMBA_CACHE_DIR"])
@@ -63,7 +65,7 @@ def _cache_root() -> Path | None:
 
 
 def source_digest(*folders: Path) -> str:
-    """Hexadecimal digest of every Python source under `folders`, names included."""
+    """Hexadecimal digest of the names and contents of all Python files under `folders`."""
     digest = hashlib.sha256()
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):
@@ -72,16 +74,16 @@ def source_digest(*folders: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-# Packages with kernels whose machine code does not depend on where they are installed.
+# Packages with kernels whose machine code does not depend on the place of installation.
 PACKAGES = Path(__file__).parents[1].resolve(), Path(__file__).parents[2].resolve() / "rigid_env"
 
-# All that machine code may depend on: these compilers, and every folder of kernels beside them.
+# Folders of all sources on which machine code may depend: the compilers and the kernels.
 SOURCES = Path(__file__).parent, Path(__file__).parents[1] / "kernels"
 
 
 @cache
 def folder_name() -> str:
-    """Name of the folder, which identifies these kernels and their compiler."""
+    """Name of the folder of machine code: a digest of the sources of all kernels, and the compiler with its options."""
     checked = "-checked" if is_checked() else ""
     if COMPILER != FUSED:
         return f"{source_digest(*SOURCES)}-{COMPILER}{checked}"
@@ -92,9 +94,9 @@ def folder_name() -> str:
 
 @cache
 def cache_dir() -> Path | None:
-    """Folder of the compiled kernels with these sources, and with or without checks of indices.
+    """Folder of the machine code of these kernels by this compiler; None if no folder is usable.
 
-    None where there is no folder of this user's: then nothing is kept.
+    With None nothing is kept on disk, and each process compiles its kernels.
     """
     root = _cache_root()
     return None if root is None else root / folder_name()

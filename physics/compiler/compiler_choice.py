@@ -1,4 +1,4 @@
-"""Choose the compiler of all kernels, once in a process: machine code two ways, or none.
+"""Choice of the compiler of all kernels, made once in a process, when this module is imported.
 
 ==========  ============================================================================================================
 `fused`     Compile kernels together through interfaces of Numba that are not public (`compiler.fused`): the fastest.
@@ -7,9 +7,9 @@
 `python`    Compile nothing. A debugger stops in a kernel as in any function; a step takes a thousand times as long.
 ==========  ============================================================================================================
 
-The environment variable `RIGID_ENV_COMPILER` names one of them; `NUMBA_DISABLE_JIT=1` means `python`. Kernels are the
-same source for all three. `numba` and `python` give the same bits; `fused` rounds a product and a sum once
-(`fused.folding_builder.fused_multiply_add`).
+The environment variable `RIGID_ENV_COMPILER` names the compiler; `NUMBA_DISABLE_JIT=1` chooses `python`. Kernels have
+one source for all three. Results of `numba` and `python` have the same bits. `fused` rounds a product and a sum
+together, only once (`fused.folding_builder.fused_multiply_add`).
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ TESTED_RELEASES = ((0, 68),)
 
 
 def choose_compiler(environment: Mapping[str, str], numba_version: str) -> tuple[str, str | None]:
-    """Choose a compiler.
+    """Choose the compiler of all kernels from the environment and the installed Numba.
 
     Parameters
     ----------
     environment : mapping
         Environment variables.
     numba_version : str
-        Version of the Numba that is installed; empty if there is none.
+        Version of the installed Numba; "" if it is not installed.
 
     Returns
     -------
     compiler : str
         One of `COMPILERS`.
     warning : str or None
-        One line for the user.
+        Line that tells the user of a slower or untested compiler; None if there is nothing to tell.
 
     Raises
     ------
     ValueError
-        `RIGID_ENV_COMPILER` is none of them.
+        `RIGID_ENV_COMPILER` names none of `COMPILERS`.
     """
     asked = environment.get(VARIABLE, "")
     if asked and asked not in COMPILERS:
@@ -72,12 +72,12 @@ def choose_compiler(environment: Mapping[str, str], numba_version: str) -> tuple
 
 
 def round_alike(one: str, other: str) -> bool:
-    """True if kernels of two compilers give the same bits."""
+    """True if kernels give the same bits with these two compilers, named as in `COMPILERS`."""
     return one == other or FUSED not in (one, other)
 
 
 def _release(numba_version: str) -> tuple[int, ...]:
-    """Major and minor number of a version."""
+    """Major and minor number of a version such as ``0.68.1``."""
     return tuple(int(part) for part in numba_version.split(".")[:2] if part.isdigit())
 
 

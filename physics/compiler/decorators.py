@@ -1,4 +1,4 @@
-"""Decorate kernels: one source for each compiler (`compiler_choice`)."""
+"""Decorators of kernels. They have the same meaning for all compilers; `compiler_choice` has chosen the one in use."""
 
 from __future__ import annotations
 
@@ -16,87 +16,95 @@ else:
     from physics.compiler.interpreted import backend
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-"""Type variable of a function whose signature a decorator keeps."""
+"""Type variable for decorators that return a function of the same signature."""
 
 is_kernel, lend = backend.is_kernel, backend.lend
 
 
 def is_compiled(value) -> bool:
-    """True for a kernel, and for a function that others have compiled by Numba."""
+    """True if a value is a kernel, or a function that other code has compiled with Numba."""
     return hasattr(value, "py_func")
 
 
 def plain_function(value):
-    """Python function of a compiled one; any other value as it is."""
+    """Python function from which a kernel was compiled; any other value is returned unchanged."""
     return getattr(value, "py_func", value)
 
 
 def kernel(function):
-    """Compile `function`: IEEE semantics, the GIL released.
+    """Decorate a function as a kernel that other kernels call; it is compiled for the types of its arguments.
 
-    A division by zero gives inf and not an exception. There is no `fastmath`, so results do not depend on how an
-    optimiser reorders a sum. `fused` rounds a product in a sum with it, which is said for each
-    (`fused.folding_builder.fused_multiply_add`). A kernel allocates nothing: arrays are lent to it.
+    Arithmetic follows IEEE 754: a division by zero gives inf, not an exception. Without `fastmath` results do not
+    depend on how an optimiser reorders a sum. With `fused` a product in a sum is rounded together with the sum
+    (`fused.folding_builder.fused_multiply_add`). Kernels run without the GIL. A kernel must not allocate arrays; it
+    works on those of its arguments.
 
-    An index counts from the front of its axis, unless it is a literal: nothing asks whether it is negative. Under
-    `NUMBA_BOUNDSCHECK=1` one that is outside its axis raises IndexError.
+    An index counts from the front of its axis, and must not be negative unless it is a literal. Only under
+    `NUMBA_BOUNDSCHECK=1` an index outside its axis raises IndexError.
 
-    Switches among the arguments are passed as ``None`` (off) or not (on). A kernel is compiled for the types of its
-    arguments, so that LLVM drops effects that are off. Numba prunes a branch on ``x is not None`` of an argument x that
-    is None before it infers types; of any other both branches have to have types. Where one has none, or is large, it
-    stands in a function that is chosen by the type of the switch (`if_given`).
+    An effect switch among the arguments is ``None`` for off, anything else for on. Since a kernel is compiled for the
+    types of its arguments, code behind a switch that is off is removed. Numba removes a branch on ``x is not None``
+    before type inference only if x itself is an argument, and None; all other branches must have types even if they
+    never run. A branch that would have no types, or is large, becomes a function of its own that the type of the switch
+    chooses (`if_given`).
 
-    A variable of a kernel with branches is not named after another one with digits behind, as x1 and x12 are: Numba may
-    take one for the other, and then cannot compile it (`tests/kernels/test_variable_names.py`).
+    In a kernel with branches no variable may have the name of another one followed by digits, as x1 and x12: Numba may
+    mistake one for the other, and then cannot compile the kernel (`tests/kernels/test_variable_names.py`).
     """
     return backend.part(function)
 
 
 def entry_kernel(function):
-    """Compile a `kernel` that Python calls directly, without `physics.parallel.bound_call`."""
+    """Decorate a function as a `kernel` that Python may call directly, without `physics.parallel.bound_call`."""
     return backend.entry(function)
 
 
 def cold_kernel(function):
-    """Compile a `kernel` that steps seldom need: `fused` does not inline it.
+    """Decorate a function as a `kernel` that steps seldom need, and that `fused` therefore does not inline.
 
-    LLVM copies a function with one call into its caller, however long it is. The caller's usual path then has fewer
-    registers for its numbers, and moves them to the stack and back.
+    LLVM would inline a function with a single call, however long it is. The usual path of the caller would then have
+    fewer registers for its numbers, and would move them to the stack and back.
     """
     function.is_cold = True
     return backend.part(function)
 
 
 def shared_kernel(function):
-    """Compile a `kernel` that all plans share: `fused` gives it its own machine code (`fused.dispatcher`)."""
+    """Decorate a function as a `kernel` that all plans share: `fused` compiles it once per signature for all of them.
+
+    `physics.compiler.fused.dispatcher` explains shared kernels.
+    """
     return backend.shared_part(function)
 
 
 def inlined(function):
-    """Compile a `kernel` of a few instructions, or with one caller: `fused` inlines it."""
+    """Decorate a function as a `kernel` that `fused` inlines: one of a few instructions, or with a single caller."""
     return backend.inlined_part(function)
 
 
 def runtime_kernel(function):
-    """Compile an `inlined` kernel made at run time, or by a user; it is kept on disk with its callers."""
+    """Decorate a function made at run time, or by a user, as an `inlined` kernel without a cache file of its own.
+
+    Its machine code is kept on disk as a part of its callers.
+    """
     return backend.runtime_part(function)
 
 
 def user_kernel(function: Function) -> Function:
-    """Compile a `runtime_kernel` of a user's function, in which an index outside its axis raises IndexError."""
+    """Decorate a user's function as a `runtime_kernel` in which an index outside its axis raises IndexError."""
     return backend.user_part(function)
 
 
 def by_type(choose: Callable, about: Callable | None = None):
-    """Make a kernel that dispatches to another kernel for each type of its arguments.
+    """Make a kernel that calls one of several functions, chosen by the types of the arguments while compiling.
 
     Parameters
     ----------
     choose : callable
-        From the types of the arguments, or from the arguments themselves where nothing is compiled, to a function of
-        the same arguments.
+        Takes the types of the arguments (the arguments themselves with the compiler `python`) and returns a function
+        of the same arguments.
     about : callable, optional
-        The function whose name and docstring it has.
+        Function whose name and docstring the kernel gets.
     """
 
     def stub(*arguments):
@@ -109,14 +117,15 @@ def by_type(choose: Callable, about: Callable | None = None):
 
 
 def when(is_chosen: Callable, otherwise=None):
-    """Make a kernel that is chosen by type: it is called where `is_chosen` is true of the types of its arguments.
+    """Make a decorator of a kernel that runs only for some types of arguments, decided while compiling.
 
     Parameters
     ----------
     is_chosen : callable
-        From the types of the arguments, or from the arguments, to a truth.
+        Takes the types of the arguments (the arguments themselves with the compiler `python`); True: the decorated
+        function is called.
     otherwise : callable or number or None
-        What is called instead, with the same arguments, or returned.
+        Replacement for other types: a function that is called with the same arguments, or a value that is returned.
     """
 
     def constant(*arguments):
@@ -136,14 +145,16 @@ def when(is_chosen: Callable, otherwise=None):
 
 
 def if_given(switch: str, otherwise=None):
-    """Make a kernel that is called where a switch is on; elsewhere `otherwise` takes its place.
+    """Make a decorator of a kernel that runs only if an effect switch is on, decided while compiling.
 
     Parameters
     ----------
     switch : str
-        Name of an argument, or of a member of one, as in `contact.friction`: None where it is off.
+        Name of the argument that is the switch, or of a member of an argument, as in `contact.friction`. It is off if
+        it is None.
     otherwise : callable or number or None
-        Function of the same arguments, or a value.
+        Replacement if the switch is off: a function that is called with the same arguments, or a value that is
+        returned.
     """
 
     def constant(*arguments):
@@ -167,5 +178,5 @@ def if_given(switch: str, otherwise=None):
 
 
 def members(group) -> list[str]:
-    """Names of the members of a record, or of its type."""
+    """Names of the members of a record, given as a record or as its type."""
     return list(backend.record_members(group))

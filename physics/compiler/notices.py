@@ -1,4 +1,4 @@
-"""Print lines about compiling on standard error."""
+"""Lines about compilation for the user, on standard error."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import sys
 
 
 def warn(text: str) -> None:
-    """Print one line on standard error."""
+    """Print a line on standard error, with the name of the package in front."""
     print(f"rigid-env: {text}", file=sys.stderr, flush=True)
 
 
 def warn_once(subject: str, text: str) -> None:
-    """Print the first line about a subject in this process."""
+    """Print a line on standard error, unless this process has printed one about the same `subject`."""
     if subject not in _SAID:
         _SAID.add(subject)
         warn(text)

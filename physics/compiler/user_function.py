@@ -1,23 +1,23 @@
-"""Examine a user's function before a step: results and errors of all compilers in one form."""
+"""Results and errors of the examination of a user's function before a step, in one form for all compilers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-# Forms of a result: one of these words, a tuple of forms, or another word for anything else.
+# Form of a value: one of these texts, a tuple of the forms of its members, or another text that describes it.
 NUMBER, NONE, ARRAY = "a number", "None", "an array"
 
 
 class Examined(NamedTuple):
-    """Result of an examination.
+    """Result of the examination of a user's function.
 
     Attributes
     ----------
     returned : str or tuple
-        Form of the result.
+        Form of the value that the function returns.
     line : tuple of (str, int) or None
-        File and line of the only statement that returns.
+        File and line of its ``return`` statement; None if there are several, or if it is unknown.
     may_raise : bool
         Whether a call may raise an exception.
     """
@@ -28,16 +28,16 @@ class Examined(NamedTuple):
 
 
 class FaultyFunctionError(Exception):
-    """Error about a function that reads or changes something forbidden.
+    """Error about a user's function that reads or changes something that it must not.
 
     Parameters
     ----------
     what : str
-        After the name of the function.
+        Message, which follows the name of the function.
     function : Callable
-        A kernel.
+        The function, a kernel.
     line : tuple of (str, int) or None
-        File and line.
+        File and line of the statement; None: unknown.
     """
 
     def __init__(self, what: str, function: Callable, line: tuple[str, int] | None):
@@ -46,12 +46,12 @@ class FaultyFunctionError(Exception):
 
 
 def entries(size: int) -> str:
-    """Number of p's entries, in words."""
+    """Entries of an array p of length `size`, in words for messages: "p[0] to p[2]"."""
     return f"p[0] to p[{size - 1}]" if size > 1 else "p[0]" if size else "none"
 
 
 def in_words(form: str | tuple) -> str:
-    """Form of a value, in words."""
+    """Describe the form of a value in words for messages."""
     if isinstance(form, str):
         return form
     if form and all(each == NUMBER for each in form):
@@ -60,7 +60,7 @@ def in_words(form: str | tuple) -> str:
 
 
 def form_of(value) -> str | tuple:
-    """Form of a value returned by a function."""
+    """Form of a value that a user's function has returned."""
     if isinstance(value, tuple):
         return tuple(map(form_of, value))
     if value is None:
@@ -75,23 +75,23 @@ def form_of(value) -> str | tuple:
 
 
 def probe(function: Callable, called: Callable, arguments: tuple, numbers: str) -> str | tuple | None:
-    """Call a function once and return the form of its result, or None if it raised an exception of its own.
+    """Call a user's function once; return the form of its result, or None if it raised an exception of its own.
 
     Parameters
     ----------
     function : Callable
-        A kernel.
+        The function, a kernel, for errors.
     called : Callable
-        The same, to be called.
+        Compiled form of the function, which is called.
     arguments : tuple
-        State, read-only numbers p, and time.
+        Arguments of the call: state of a body, read-only numbers p of the field, and time.
     numbers : str
-        The numbers in p, in words.
+        Description of the numbers in p, for messages.
 
     Raises
     ------
     FaultyFunctionError
-        It reads beyond the end of p, or writes to p.
+        The function reads beyond the end of p, or writes to p.
     """
     try:
         return form_of(called(*arguments))

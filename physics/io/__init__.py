@@ -1,1 +1,1 @@
-"""Scenes and runs as files."""
+"""Files of scenes (TOML, MJCF) and recordings of steps."""

@@ -1,4 +1,4 @@
-"""Keep the last steps of a batch of worlds, for a bit-for-bit replay of faults."""
+"""Recorder, which keeps the last steps of a batch of worlds, so that faults can be replayed bit for bit."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from physics.world.world import World
 
 
 class _Load(NamedTuple):
-    """Arguments of a call, for all worlds."""
+    """Arguments of one call of a step, for all worlds."""
 
-    wrench: np.ndarray
-    past: np.ndarray | None  # past the actuator
+    wrench: np.ndarray  # (worlds, bodies, 6)
+    past: np.ndarray | None  # (worlds, bodies, 6), load that bypasses the actuator
     steps: int
-    dt: float
+    dt: float  # [s]
 
 
 @dataclass
 class _Chapter:
-    """Consecutive steps of the batch from one complete snapshot on."""
+    """Consecutive calls of a step, with the states of all worlds before the first, and their changes from outside."""
 
-    # (step, worlds, rows of each kept array for each of these worlds, time)
+    # States before a call: number of the call, worlds, rows of each kept array for each of these worlds, time [s].
     starts: list[tuple[int, np.ndarray, list[np.ndarray], float]] = field(default_factory=list)
     loads: list[_Load] = field(default_factory=list)
     states: list[np.ndarray] = field(default_factory=list)
@@ -40,7 +40,7 @@ class _Chapter:
 
 @known_keywords
 class Recorder:
-    """Keeps the last steps of a `World` and writes those of a world with a fault to a file.
+    """Keeper of the last steps of a `World`; it writes the steps of a world with a fault to a file.
 
     The recorder sees every step of `World.step`, of a `Stepper` and of an environment. It sees every change by
     `set_state`, `set_parameters` and `restore`, but not arrays of the world written directly. Worlds are independent,
@@ -49,26 +49,27 @@ class Recorder:
     Parameters
     ----------
     world : World
-        Has one recorder at a time: this one from now on.
+        World to record. It has one recorder at a time; this one replaces an earlier one.
     keep : int
-        Calls of a step that can be replayed at least; up to twice as many are kept, each with a copy of all wrenches
-        and states (176 bytes per body).
+        Least number of calls of a step that can be replayed. Up to twice as many are kept, each with a copy of all
+        wrenches and states (176 bytes per body).
     folder : str or Path, optional
-        Where files go; made when there is one. None: only `save` writes.
+        Folder for automatic files, made when the first is written. None: only `save` writes files.
     on : sequence of Status
-        What makes a world's steps a file.
+        Statuses of a world after which its steps are written automatically.
     limit : int
-        Files that are written by themselves, at most.
+        Largest number of automatic files.
 
     Attributes
     ----------
     files : list of Path
-        Written by themselves.
+        Paths of the automatic files.
 
     Raises
     ------
     ValueError
-        A parameter out of range; or the world has an `Actuator` with a lag or a delay, whose memory no recording holds.
+        A parameter out of range; or the world has an `Actuator` with a lag or a delay, whose memory a recording does
+        not hold.
 
     Examples
     --------
@@ -107,18 +108,18 @@ class Recorder:
         world.recorder = self
 
     def stop(self) -> None:
-        """Detach from the world; the kept steps stay."""
+        """Stop recording the world; the steps kept so far can still be saved."""
         if self.world.recorder is self:
             self.world.recorder = None
 
     # --- told by the world -------------------------------------------------------------------------------------
 
     def changed(self, worlds: np.ndarray | slice) -> None:
-        """Note that these worlds were changed from outside."""
+        """Note that a user has changed these worlds; the next call of a step begins with a copy of their states."""
         self._changed[worlds] = True
 
     def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Note the start of a step."""
+        """Keep the arguments of a call of a step, and the states of changed worlds, before the call."""
         chapter = self._chapters[-1]
         if len(chapter.loads) == self.keep:
             chapter = _Chapter()
@@ -133,7 +134,7 @@ class Recorder:
         chapter.loads.append(_Load(wrench.copy(), None if past is None else past.copy(), steps, dt))
 
     def after(self) -> None:
-        """Note the end of a step."""
+        """Keep the states after a call of a step, and write files for worlds with a status among `on`."""
         self._chapters[-1].states.append(self.world.state.copy())
         if self.folder is None or len(self.files) == self.limit:
             return
@@ -145,23 +146,28 @@ class Recorder:
             self.files.append(self.recording(world, reason).save(_free_path(self.folder, status.name.lower())))
 
     def undone(self) -> None:
-        """Drop the announced step: it was not taken, and the world is as before."""
+        """Forget the last call announced by `before`, which an exception has ended and undone."""
         chapter = self._chapters[-1]
         del chapter.loads[len(chapter.states) :]
 
     # --- asked by the user -------------------------------------------------------------------------------------
 
     def save(self, path: str | Path, world: int = 0, reason: str = "requested") -> Path:
-        """Write the last steps of one world; returns the path."""
+        """Write the last steps of the world with index `world` to a file; return the path.
+
+        `reason` is a text that the file keeps.
+        """
         return self.recording(world, reason).save(path)
 
     def recording(self, world: int = 0, reason: str = "requested") -> Recording:
-        """Last steps of one world, at least `keep` if so many were taken.
+        """Make a recording of the last steps of the world with index `world`.
+
+        It holds at least `keep` calls of a step, if so many were made.
 
         Raises
         ------
         ValueError
-            There is no such world.
+            No such world exists.
         """
         worlds, bodies = self.world.worlds, self.world.body_count
         validation.index(world, worlds, "world")
@@ -191,7 +197,7 @@ class Recorder:
 
 
 def _past(loads: Sequence[_Load], world: int, bodies: int) -> np.ndarray | None:
-    """Loads (n, bodies, 6) of one world past its actuator; None without any."""
+    """Loads (n, bodies, 6) of one world that bypassed its actuator in n calls; None if there were none."""
     if all(load.past is None for load in loads):
         return None
     nothing = np.zeros((bodies, 6))
@@ -199,14 +205,17 @@ def _past(loads: Sequence[_Load], world: int, bodies: int) -> np.ndarray | None:
 
 
 def _rows(array: np.ndarray, worlds: int, chosen: np.ndarray) -> np.ndarray:
-    """Copied rows (chosen, rows of a world, columns) of some worlds in an array with each world's rows in turn."""
+    """Copy the rows of the chosen worlds of an array: (k, rows of a world, columns).
+
+    The array holds the rows of the first of `worlds` worlds, then of the second, and so on.
+    """
     if len(array) < worlds:  # the contact memory of a scene without contact: one row, never used
         return np.broadcast_to(array, (len(chosen), *array.shape)).copy()
     return array.reshape(worlds, len(array) // worlds, *array.shape[1:])[chosen]
 
 
 def _starts_of(chapter: _Chapter, world: int, first: int, count: int, scene: dict[str, str]) -> list[Start]:
-    """Find the starts of one world in a chapter whose first step is number `first` of the recording."""
+    """Find the starts of one world in the first `count` calls of a chapter, which begins with call `first`."""
     found = []
     for step, worlds, rows, time in chapter.starts:
         place = np.flatnonzero(worlds == world)
@@ -217,7 +226,7 @@ def _starts_of(chapter: _Chapter, world: int, first: int, count: int, scene: dic
 
 
 def _free_path(folder: Path, name: str) -> Path:
-    """Path in `folder` that no file has, even if several processes write there."""
+    """Create an empty file with a new name in `folder`, safe against other processes; return its path."""
     number = 0
     while True:
         path = folder / f"{name}-{number}.npz"

@@ -1,4 +1,4 @@
-"""A file of one world's steps, and its bit-for-bit replay.
+"""Recording of one world's steps, its file, and its replay, which is compared bit for bit.
 
 The future of a world follows from its `Snapshot`, and from the wrenches and lengths of its steps. A recording holds
 these, the scene as text, and the state after every step, with which a replay is compared.
@@ -37,25 +37,26 @@ from physics.world.snapshot import KEPT, Snapshot
 from physics.world.stepper import Stepper
 from physics.world.world import World
 
-# Number of the format; a reader refuses what is newer than itself. Format 2 has loads past an actuator.
+# Number of the file format; a reader refuses newer formats than its own. Format 2 adds loads that bypass an actuator.
 FORMAT = 2
 ALLOWED = "allowed is what physics.Recorder writes (.npz)"
 
-# Difference allowed in a replay by a compiler that rounds differently. Before the first contact changes it is rounding;
-# from then on a solver's tolerance decides, 2e-7 for a block dropped at `balanced`. Chaotic motion exceeds any number.
+# Difference allowed in a replay by a compiler that rounds differently. Up to the first contact the difference is
+# rounding; after it the solver's tolerance decides, 2e-7 for a block dropped at `balanced`. In chaotic motion it grows
+# beyond any bound.
 OTHER_COMPILER = 1.0e-6
 
 
 @dataclass(frozen=True)
 class Start:
-    """State from which the recorded world continued: the first one, and one after each change from outside.
+    """State of a recorded world before its first call of a step, or after a change from outside.
 
     Parameters
     ----------
     step : int
-        Number of the recorded step that it is before.
+        Number of the recorded call that follows.
     snapshot : Snapshot
-        Of one world.
+        State of the one world.
     """
 
     step: int
@@ -64,28 +65,30 @@ class Start:
 
 @dataclass(frozen=True)
 class Recording:
-    """Consecutive calls of `World.step` of one world.
+    """Consecutive calls of `World.step` of one world, with everything that a replay needs.
 
     Parameters
     ----------
     scene : Scene
+        Scene of the world.
     accuracy : Accuracy
+        Accuracy of the world.
     starts : tuple of Start
-        The first is before step 0.
+        States before call 0 and after each change from outside.
     wrenches : (n, bodies, 6) float64
-        Force [N] and torque [N m] of each call, world frame.
+        Force [N] and torque [N m] of each of the n calls, world frame.
     steps : (n,) int64
-        Steps that each call took at once.
+        Number of steps of each call.
     dt : (n,) float64
-        Length of one of them [s].
+        Length of a step of each call [s].
     states : (n, bodies, STATE_SIZE) float64
-        After each call; columns in `physics.kernels.state.layout`.
+        States after each call; columns in `physics.kernels.state.layout`.
     reason : str
-        Why it was kept.
+        Reason for which the recording was kept.
     origin : dict of str to str
-        What it was made with: version, kernels, compiler, numba, numpy, python, machine.
+        Software and processor that made it: version, kernels, compiler, numba, numpy, python, machine.
     past : (n, bodies, 6) float64 or None
-        Force [N] and torque [N m] of each call that went past the actuator, as gusts of an environment do; None: none.
+        Force [N] and torque [N m] of each call that bypassed the actuator, as gusts of an environment do; None: none.
     """
 
     scene: Scene
@@ -112,13 +115,13 @@ class Recording:
         return len(self.states)
 
     def world(self) -> World:
-        """Make a `World` of one world in the state before the first step."""
+        """Make a `World` of one world in the state before the first recorded call."""
         world = World(self.scene, dt=float(self.dt[0]) if len(self) else 0.01, accuracy=self.accuracy)
         world.restore(self.starts[0].snapshot)
         return world
 
     def replay(self) -> Replay:
-        """Take the recorded steps again in a new `World`."""
+        """Repeat the recorded calls in a new `World`; return the outcome, which compares the states."""
         world = self.world()
         starts = {start.step: start.snapshot for start in self.starts}
         steppers: dict[tuple[int, float], Stepper] = {}
@@ -138,13 +141,13 @@ class Recording:
         return Replay(self, np.array(states).reshape(self.states.shape), tuple(reports), np.array(energies))
 
     def past_actuator(self, world: World, k: int) -> AbstractContextManager[None]:
-        """Let the load of call `k` that bypassed the actuator act in a world during a block."""
+        """Context manager in which the load of call `k` that bypassed the actuator acts in a world."""
         if self.past is None or world.actuation is None:
             return nullcontext()
         return world.actuation.passed_by(self.past[k : k + 1])
 
     def save(self, path: str | Path) -> Path:
-        """Write the recording as ``.npz`` (`load` reads it); return the path."""
+        """Write the recording as an ``.npz`` file, which `load` reads; return the path."""
         head = {
             "format": 1 if self.past is None else FORMAT, "scene": to_toml(self.scene),
             "accuracy": asdict(self.accuracy), "reason": self.reason, "origin": self.origin,
@@ -166,18 +169,19 @@ class Recording:
 
     @classmethod
     def load(cls, path: str | Path, kinds: Sequence[type[Field]] = ()) -> Recording:
-        """Read a recording.
+        """Read a recording that `save` or a `Recorder` has written.
 
         Parameters
         ----------
         path : str or Path
+            Path of the file.
         kinds : sequence of classes, optional
-            Fields of your own that its scene may name; a file never imports code on its own.
+            Classes of a user's own fields that the recorded scene has. Reading a file never imports code.
 
         Raises
         ------
         ValueError
-            It is no recording, or one of a newer format.
+            The file is no recording, is damaged, or has a newer format.
         OSError
             The file cannot be read.
         """
@@ -192,7 +196,7 @@ class Recording:
             found = _from_parts(head, content) if number <= FORMAT else {}
         except OSError:
             raise
-        except Exception as error:  # whatever is wrong with it, it is none
+        except Exception as error:  # any fault means that the file is no recording
             told = f"there is no {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"{path} is no recording ({told}); {ALLOWED}") from None
         if number > FORMAT:
@@ -203,11 +207,11 @@ class Recording:
 
 
 def _from_parts(head: dict[str, Any], content: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Fields of a recording except its scene, from the head and the arrays of a file."""
+    """Make the fields of a `Recording`, except its scene, from the head and the arrays of a file."""
     head_value(head, "scene", is_text, "a scene as TOML")
     settings = head_value(head, "accuracy", lambda value: Accuracy(**value), "the fields of a physics.Accuracy")
     about = head_value(head, "origin", _is_table_of_text, "names and texts")
-    about.setdefault("compiler", FUSED)  # there was no other
+    about.setdefault("compiler", FUSED)  # files without this entry are from versions with one compiler
     content["start_report_table"] = _widened(content["start_report_table"])
     columns = [content[f"start_{name}"] for name in KEPT if name != "sleep" or "start_sleep" in content]
     starts = zip(content["start_steps"].tolist(), content["start_times"].tolist(), zip(*columns))
@@ -224,21 +228,24 @@ def _is_table_of_text(value: Any) -> bool:
 
 
 def _widened(table: np.ndarray) -> np.ndarray:
-    """Report table (..., columns) of a version with fewer columns, filled with zeros."""
+    """Widen a report table (..., columns) of an earlier version to the present columns, with zeros."""
     return np.pad(table, [(0, 0)] * (table.ndim - 1) + [(0, max(0, at.REPORT_SIZE - table.shape[-1]))])
 
 
 @dataclass(frozen=True)
 class Replay:
-    """Outcome of a replay of a `Recording`.
+    """Outcome of a replay of a `Recording`, and its comparison with the recorded states.
 
     Parameters
     ----------
     recording : Recording
+        Recording that was replayed.
     states : (n, bodies, STATE_SIZE) float64
+        States of the replay after each of the n calls.
     reports : tuple of StepReport
+        Report of each call.
     energies : (n,) float64
-        Of all bodies, kinetic and potential [J].
+        Kinetic and potential energy of all bodies together after each call [J].
     """
 
     recording: Recording
@@ -257,15 +264,18 @@ class Replay:
 
     @property
     def tolerance(self) -> float:
-        """Tolerance of the comparison: 0 (bits), or `OTHER_COMPILER` if the recording's compiler rounds differently.
+        """Tolerance of the comparison: 0, or `OTHER_COMPILER` if the recording's compiler rounds differently.
 
-        A number x of a state may differ by the tolerance times (1 + |x|).
+        0 compares bits. Otherwise a number x of a state may differ by the tolerance times (1 + |x|).
         """
         return 0.0 if round_alike(self.recording.origin["compiler"], COMPILER) else OTHER_COMPILER
 
     @property
     def first_difference(self) -> int | None:
-        """First step whose state differs from the recorded one, by a bit or beyond `tolerance`; None if all agree."""
+        """Index of the first call after which a state differs from the recorded one by more than `tolerance`.
+
+        With the tolerance 0 states differ if any bit does. None: all states agree.
+        """
         ours, theirs = self.states, self.recording.states
         is_other = ours.view(np.int64) != theirs.view(np.int64)
         if self.tolerance > 0.0:
@@ -275,18 +285,18 @@ class Replay:
 
     @property
     def is_identical(self) -> bool:
-        """True if every state is the recorded one, bit for bit."""
+        """True if all states of the replay equal the recorded states bit for bit."""
         return np.array_equal(self.states.view(np.int64), self.recording.states.view(np.int64))
 
     @property
     def distances(self) -> np.ndarray:
-        """Largest distance (n,) of any body from its recorded place [m]."""
+        """Largest distance (n,) of a body's centre of mass from its recorded place after each call [m]."""
         offset = (self.states - self.recording.states)[:, :, at.POS : at.POS + 3]
         return np.sqrt((offset * offset).sum(axis=-1)).max(axis=1, initial=0.0)
 
     @property
     def times(self) -> np.ndarray:
-        """Times (n,) after each call since the world began [s]."""
+        """Time (n,) of the recorded world after each call [s]."""
         recording, times, now = self.recording, [], 0.0
         starts = {start.step: start.snapshot.time for start in recording.starts}
         for k, (steps, dt) in enumerate(zip(recording.steps.tolist(), recording.dt.tolist())):
@@ -296,7 +306,10 @@ class Replay:
 
 
 def origin() -> dict[str, str]:
-    """Software and processor of a new recording; where any differs, a replay may differ in the last bits."""
+    """Names and versions of the software and processor in use, for a new recording.
+
+    If any of them differs in a replay, the states may differ in their last bits.
+    """
     return {
         "version": version(),
         "kernels": folder_name(),  # digest of their sources

@@ -1,26 +1,27 @@
-"""Lines of tables and keys in the text of a scene file.
+"""Lines of tables and keys in the text of a scene file, for errors.
 
-The reader of TOML gives values without lines, so these are searched in the text. A table [[bodies]] is found by its
-header, a key below it, before the next header. Errors in inline tables, ``bodies = [{...}]``, name the line of the
-list.
+The TOML reader returns values without lines, so lines are searched in the text. A table such as [[bodies]] is found by
+its header, and a key between this header and the next one. Errors in inline tables, ``bodies = [{...}]``, name the line
+of the list.
 """
 
 from __future__ import annotations
 
 import re
 
-# Header of a table, and not a row of numbers in an array that goes over several lines.
+# Header of a table; a row of numbers in an array of several lines does not match.
 HEADER = re.compile(r"\s*\[\[?\s*[A-Za-z_\"'][^,]*\]\s*(#.*)?$")
 
 
 class SourceLines:
-    """Lines of one file's text.
+    """Text of a scene file in which errors find their lines.
 
     Parameters
     ----------
     text : str
+        Text of the file.
     source : str
-        What messages call the file.
+        Name of the file in messages.
     """
 
     def __init__(self, text: str, source: str):
@@ -28,7 +29,10 @@ class SourceLines:
         self._source = source
 
     def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table [[name]] number `index`, or of the file's head."""
+        """Make an error about a key of the table [[name]] number `index`; `name` None: of the head of the file.
+
+        `key` None makes an error about the whole table.
+        """
         start = self._table_line(name, index)
         if name is not None and not start:
             line = self._key_line(0, name) or 1
@@ -38,11 +42,11 @@ class SourceLines:
         return ValueError(f"{self._source}, line {line}: {place}{message}")
 
     def error_in_table(self, name: str, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table [name], such as ``environment.goal``, or about the table."""
+        """Make an error about a key of the table [name], such as ``environment.goal``; `key` None: about the table."""
         return ValueError(f"{self._source}, line {self._line_in_table(name, key)}: {name}: {message}")
 
     def _line_in_table(self, name: str, key: str | None) -> int:
-        """Line of a key in a table, or of the nearest text: nested tables may be written inline."""
+        """Line of a key in the table [name], or of the table around it where that is written inline."""
         parts = [*name.split("."), key]
         for depth in range(len(parts) - 1, 0, -1):
             dotted = r"\s*\.\s*".join(rf"[\"']?{re.escape(part)}[\"']?" for part in parts[:depth])
@@ -53,7 +57,11 @@ class SourceLines:
         return self._key_line(0, parts[0]) or 1
 
     def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
-        """Error about the whole scene, placed at the table in its message, given by number or by an effect's class."""
+        """Make an error from a message about a whole scene, with the line of the table that the message names.
+
+        The message names a table by its number, as in ``bodies[2]``, or by the class of an effect. `lists` holds the
+        scene's bodies, walls and effects.
+        """
         told = re.search(r"\b(bodies|walls|effects)\[(\d+)\]", message)
         if told:
             return self._error_at(told.group(1), int(told.group(2)), message)
@@ -69,7 +77,7 @@ class SourceLines:
         return ValueError(f"{self._source}, line {line}: {message}")
 
     def _table_line(self, name: str | None, index: int) -> int:
-        """Line of a table's header; 0 for the head of the file, and for an inline table."""
+        """Line of the header of table number `index` of the list [[name]]; 0 for the file's head and inline tables."""
         if name is None:
             return 0
         header = re.compile(rf"\s*\[\[\s*[\"']?{name}[\"']?\s*\]\]")
@@ -77,7 +85,7 @@ class SourceLines:
         return found[index] if index < len(found) else 0
 
     def _key_line(self, start: int, key: str | None) -> int | None:
-        """Line of a key of the table whose header is on line `start`."""
+        """Line of a key of the table whose header is on line `start` (0: of any table); None if it is not found."""
         if key is None:
             return None
         wanted = re.compile(rf"\s*(\[\[?\s*)?[\"']?{re.escape(key)}[\"']?\s*[.=\]]")

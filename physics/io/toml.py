@@ -1,9 +1,10 @@
-"""Scenes as TOML files: the description of a scene without code.
+"""Scenes as TOML files, which describe a scene without code.
 
-One table per body, wall and effect; `kind` is the class, the other keys are its parameters under their names, in SI
-units. What is left out keeps its default. Files are read with the standard library's reader and written with tomlkit.
+A file has a table for each body, wall and effect. Its key `kind` names the class; the other keys are parameters of the
+class, in SI units. Parameters that are left out keep their defaults. Files are read with the standard library's reader
+and written with tomlkit.
 
-A file may hold tables for programs that use scenes, such as [environment]: they are handed back as they stand.
+A file may also hold tables for programs that use scenes, such as [environment]. They are returned unchecked.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-# Number of the format; a reader refuses what is newer than itself.
+# Number of the file format; a reader refuses newer formats than its own.
 FORMAT = 1
 
 BODIES = (Block, Sphere, Ellipsoid, Hull)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 LISTS = ("bodies", "walls", "effects")
 
-# Tables that are no part of a scene: read, but left to the programs that know them.
+# Names of tables that are no part of a scene; they are read for the programs that use them.
 OTHERS = ("environment",)
 
 
@@ -50,8 +51,9 @@ class SceneFile:
     Attributes
     ----------
     scene : Scene
+        Scene of the file.
     others : dict of str to dict
-        Tables of `OTHERS` that the file has, with what stands in them, unchecked.
+        Tables of the file that are named in `OTHERS`, unchecked.
     lines : SourceLines
         Lines of the file, for errors about these tables.
     """
@@ -62,14 +64,16 @@ class SceneFile:
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:
-    """Write a scene as TOML; `load_scene` reads an equal one.
+    """Write a scene as a TOML file, from which `load_scene` reads an equal scene.
 
-    Fields of your own are written by the name of their class; `load_scene` wants that class among its `kinds`.
+    A user's own fields are written with the name of their class; `load_scene` needs that class among its `kinds`.
 
     Parameters
     ----------
     scene : Scene
+        Scene to write.
     path : str or Path
+        Path of the file; an existing file is overwritten.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     validation.path(path)
@@ -77,7 +81,7 @@ def save_scene(scene: Scene, path: str | Path) -> None:
 
 
 def to_toml(scene: Scene) -> str:
-    """Text of the file that `save_scene` writes."""
+    """Make the TOML text of a scene, as `save_scene` writes it."""
     document = tomlkit.document()
     document.add(tomlkit.comment("Metres, kilograms, seconds, radians; quaternions (w, x, y, z), body to world."))
     document.add("format", FORMAT)
@@ -96,7 +100,7 @@ def to_toml(scene: Scene) -> str:
 
 
 def _parameters(item) -> dict:
-    """Parameters of a body, wall or effect that are not at their defaults, as lists and numbers."""
+    """Parameters of a body, wall or effect that differ from their defaults, by name; tuples become lists."""
     found = {}
     for field in fields(item):
         value = getattr(item, field.name)
@@ -111,18 +115,19 @@ def _plain(value):
 
 @known_keywords
 def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
-    """Read a scene from a TOML file. `rigid_env` reads its table [environment].
+    """Read a scene from a TOML file. Its table [environment], which only `rigid_env` uses, is ignored.
 
     Parameters
     ----------
     path : str or Path
+        Path of the file.
     kinds : sequence of classes, optional
-        Fields of your own that the file may name. A file never imports code on its own.
+        Classes of a user's own fields that the file may name. Reading a file never imports code.
 
     Raises
     ------
     ValueError
-        Naming file, line and key, the value, and what is allowed.
+        The file is no scene file, or a value is not allowed. The message names file, line, key and value.
     OSError
         The file cannot be read.
     """
@@ -130,7 +135,7 @@ def load_scene(path: str | Path, kinds: Sequence[type[Field]] = ()) -> Scene:
 
 
 def load_file(path: str | Path, kinds: Sequence[type[Field]] = ()) -> SceneFile:
-    """Read all of a scene file; arguments and errors as of `load_scene`."""
+    """Read a scene and the other tables of a TOML file; arguments and errors are those of `load_scene`."""
     validation.path(path)
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -143,12 +148,15 @@ def load_file(path: str | Path, kinds: Sequence[type[Field]] = ()) -> SceneFile:
 
 
 def from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> Scene:
-    """Make the scene of a text; messages name the text `source`."""
+    """Make a scene from a TOML text; messages call the text `source`. `kinds` is that of `load_scene`."""
     return file_from_toml(text, source, kinds).scene
 
 
 def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]] = ()) -> SceneFile:
-    """Read all of a scene file's text; messages name the text `source`."""
+    """Make a scene and the other tables from a TOML text; messages call the text `source`.
+
+    `kinds` is that of `load_scene`.
+    """
     kinds = _own_kinds(kinds)
     try:
         content = tomllib.loads(text)
@@ -166,7 +174,7 @@ def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]
 
 
 def _check_head(lines: SourceLines, content: dict) -> None:
-    """Refuse unknown keys and tables of a file's head, and formats that are newer than this reader."""
+    """Refuse a file with unknown keys or tables at its top level, or with a newer format."""
     known = ("format", *LISTS, *OTHERS)
     for key in content:
         if key not in known:
@@ -181,7 +189,7 @@ def _check_head(lines: SourceLines, content: dict) -> None:
 
 
 def _own_kinds(kinds) -> tuple:
-    """Classes of a user's fields that a file may name."""
+    """Check the classes of a user's own fields that a file may name; return them as a tuple."""
     found = tuple(kinds) if isinstance(kinds, Iterable) else (kinds,)
     for kind in found:
         if not isinstance(kind, type) or not issubclass(kind, Field):
@@ -190,7 +198,7 @@ def _own_kinds(kinds) -> tuple:
 
 
 def _syntax_error(text: str, source: str, message: str) -> str:
-    """Error with the reader's message, the place before it and the line after it."""
+    """Make the text of an error from the message of the TOML reader, with file, line and the text of that line."""
     told = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)
     if told is None:
         return f"{source}: {message}"
@@ -202,7 +210,7 @@ def _syntax_error(text: str, source: str, message: str) -> str:
 
 
 def _build_all(lines: SourceLines, name: str, tables, known: tuple[type, ...]) -> list:
-    """The objects of a list of tables."""
+    """Make the bodies, walls or effects (`name`) of a file from their tables; `known` are the allowed classes."""
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise lines.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
     return [_build(lines, name, k, dict(table), known) for k, table in enumerate(tables)]

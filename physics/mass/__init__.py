@@ -1,1 +1,1 @@
-"""Mass, centre, and inertia of shapes."""
+"""Mass properties of shapes: mass, centre of mass and inertia tensor."""

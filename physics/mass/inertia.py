@@ -1,11 +1,11 @@
 """Mass properties: the table of inertia tensors, and the algebra that combines them.
 
-Every shape below is of uniform density and gives its inertia tensor
-[kg m²] about its centre of mass as a (3, 3) array in its body frame, which is
-its principal frame. A body of revolution (cylinder, disk) and a rod have their
-axis along **body y**, so that one placed with the identity stands upright in a
-world whose y is up. Lengths are in metres and masses in kilograms; one that is
-not finite and positive raises a ValueError that names it.
+Every function for a shape assumes uniform density and returns the inertia tensor
+[kg m²] about the centre of mass as a (3, 3) array in the body frame, which is
+the principal frame. A body of revolution (cylinder, disk) and a rod have their
+axis along **body y**, so that a body with the identity as attitude stands upright
+in a world whose y is up. Lengths are in metres and masses in kilograms; a length
+or mass that is not finite and positive raises a ValueError that names it.
 
 Sources: Witkin and Baraff, *Physically Based Modeling* (SIGGRAPH course notes,
 1997), "Rigid Body Simulation I", sections 2.10-2.11, for the tensor and the
@@ -26,19 +26,19 @@ from numpy.typing import ArrayLike
 from physics import validation
 from physics.summary import shown
 
-# Relative to the largest moment: what sums of a thousand rounded terms may lose (1e3 · 4 · 2.2e-16).
+# Rounding error of sums of a thousand terms, relative to the largest moment (1e3 · 4 · 2.2e-16).
 RELATIVE_TOLERANCE = 1e-12
-# Relative to the largest moment: what R I Rᵀ may leave off the diagonal of a tensor that is diagonal.
+# Rounding error of R I Rᵀ off the diagonal of a tensor that should be diagonal, relative to the largest moment.
 DIAGONAL_TOLERANCE = 8 * np.finfo(float).eps
 
 
-# Smallest mass and moment of inertia [kg, kg m²], and inverse of the largest: products of two of them and of their
-# inverses are normal floats.
+# Smallest allowed mass and moment of inertia [kg, kg m²]; the largest is its inverse. Products of two such numbers, and
+# of their inverses, are normal floats.
 LEAST = 1e-150
 
 
 def _floats(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """`value` as a finite float64 array of `shape` (-1: any length), or a ValueError."""
+    """Convert `value` to a finite float64 array of `shape` (-1: any length); an error calls the argument `field`."""
     array = np.array(validation.floats(value, field, f"are numbers in shape {shape}"))
     fits = array.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, array.shape))
     if not fits or not np.all(np.isfinite(array)):
@@ -47,7 +47,7 @@ def _floats(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def _positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """`value` as a finite positive float64 array of `shape`, or a ValueError."""
+    """Convert `value` to a finite, positive float64 array of `shape`; an error calls the argument `field`."""
     array = _floats(value, shape, field)
     if not np.all(array > 0):
         raise ValueError(f"{field} is {value!r}; allowed is what is greater than 0")
@@ -55,7 +55,7 @@ def _positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarra
 
 
 def _hollow(radius: float, inner_radius: float | None) -> tuple[float, float]:
-    """Outer and inner radius, checked; `inner_radius` None is an infinitely thin wall."""
+    """Check and return outer and inner radius of a hollow body [m]; `inner_radius` None is an infinitely thin wall."""
     outer = float(_positive(radius, (), "radius"))
     inner = outer if inner_radius is None else float(_floats(inner_radius, (), "inner_radius"))
     if not 0 <= inner <= outer:
@@ -64,7 +64,7 @@ def _hollow(radius: float, inner_radius: float | None) -> tuple[float, float]:
 
 
 def _of_revolution(across: float, along: float) -> np.ndarray:
-    """Tensor of a body of revolution about its y axis, from moments across and along the axis."""
+    """Inertia tensor (3, 3) of a body of revolution about body y, from its moments across and along that axis."""
     return np.diag([across, along, across])
 
 
@@ -79,31 +79,34 @@ def ellipsoid_moments(semi_axes: np.ndarray, mass: float | np.ndarray) -> np.nda
 
 
 def _plane_symmetric(axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
-    """(b² + c², a² + c², a² + b²) mass: moments of a body with three planes of symmetry are a share of these."""
+    """Products (b² + c², a² + c², a² + b²) mass (..., 3), where `axes` (..., 3) are (a, b, c).
+
+    Divided by 12 they are the moments of blocks with these edges, by 5 those of ellipsoids with these semi-axes.
+    """
     a, b, c = np.moveaxis(axes * axes, -1, 0)
     return np.stack([b + c, a + c, a + b], axis=-1) * np.asarray(mass)[..., None]
 
 
 def block(size: ArrayLike, mass: float) -> np.ndarray:
-    """Inertia of a solid block of edges `size` (3,) [m], along the body axes."""
+    """Inertia tensor (3, 3) of a solid block with edges `size` (3,) [m] along the body axes."""
     return np.diag(block_moments(_positive(size, (3,), "size"), _positive(mass, (), "mass")))
 
 
 def solid_ellipsoid(semi_axes: ArrayLike, mass: float) -> np.ndarray:
-    """Inertia of a solid ellipsoid, `semi_axes` (a, b, c) [m] along the body axes."""
+    """Inertia tensor (3, 3) of a solid ellipsoid with `semi_axes` (3,) [m] along the body axes."""
     return np.diag(ellipsoid_moments(_positive(semi_axes, (3,), "semi_axes"), _positive(mass, (), "mass")))
 
 
 def solid_sphere(radius: float, mass: float) -> np.ndarray:
-    """Inertia 2/5 M r² of a solid sphere, about any axis."""
+    """Inertia tensor (3, 3) of a solid sphere: 2/5 M r² about any axis."""
     return hollow_sphere(radius, mass, 0.0)
 
 
 def hollow_sphere(radius: float, mass: float, inner_radius: float | None = None) -> np.ndarray:
-    """Inertia of a spherical shell: 2/3 M r² for a thin wall (`inner_radius` None).
+    """Inertia tensor (3, 3) of a hollow sphere: 2/3 M r² about any axis if its wall is thin (`inner_radius` None).
 
-    A wall from r to R has 2/5 M (R⁵ - r⁵) / (R³ - r³); both differences are
-    divided by R - r here, so that nothing cancels as the wall becomes thin.
+    A wall between the radii r and R has 2/5 M (R⁵ - r⁵) / (R³ - r³). The code
+    divides both differences by R - r, which avoids cancellation for thin walls.
     """
     outer, inner = _hollow(radius, inner_radius)
     mass = float(_positive(mass, (), "mass"))
@@ -114,15 +117,15 @@ def hollow_sphere(radius: float, mass: float, inner_radius: float | None = None)
 
 
 def solid_cylinder(radius: float, height: float, mass: float) -> np.ndarray:
-    """Inertia of a solid cylinder, axis along body y: M r²/2 along it, M (3 r² + h²)/12 across."""
+    """Inertia tensor (3, 3) of a solid cylinder along body y: M r²/2 about the axis, M (3 r² + h²)/12 across it."""
     return hollow_cylinder(radius, height, mass, 0.0)
 
 
 def hollow_cylinder(radius: float, height: float, mass: float, inner_radius: float | None = None) -> np.ndarray:
-    """Inertia of an open tube, axis along body y; thin wall if `inner_radius` is None.
+    """Inertia tensor (3, 3) of a tube with open ends along body y; its wall is thin if `inner_radius` is None.
 
-    A wall from r to R has M (R² + r²)/2 along the axis and
-    M (3 (R² + r²) + h²)/12 across it. The ends are open.
+    A wall between the radii r and R has M (R² + r²)/2 about the axis and
+    M (3 (R² + r²) + h²)/12 across it.
     """
     outer, inner = _hollow(radius, inner_radius)
     height = float(_positive(height, (), "height"))
@@ -132,39 +135,43 @@ def hollow_cylinder(radius: float, height: float, mass: float, inner_radius: flo
 
 
 def disk(radius: float, mass: float) -> np.ndarray:
-    """Inertia of a flat disk, axis along body y: M r²/2 along it, M r²/4 across."""
+    """Inertia tensor (3, 3) of a flat disk with its axis along body y: M r²/2 about the axis, M r²/4 across it."""
     square = float(_positive(radius, (), "radius")) ** 2
     mass = float(_positive(mass, (), "mass"))
     return _of_revolution(across=mass * square / 4, along=mass * square / 2)
 
 
 def rod(length: float, mass: float) -> np.ndarray:
-    """Inertia of a thin rod along body y: M L²/12 across, 0 along (allowed as a part, not as a whole body)."""
+    """Inertia tensor (3, 3) of a thin rod along body y: M L²/12 across the rod, 0 about it.
+
+    A rod may be a part of a body (`compose`), but not a whole one, since `check_inertia` refuses a moment of 0.
+    """
     length = float(_positive(length, (), "length"))
     return _of_revolution(across=float(_positive(mass, (), "mass")) * length**2 / 12, along=0.0)
 
 
 def _displaced(offset: np.ndarray, mass: float) -> np.ndarray:
-    """Tensor (d·d 1 - d dᵀ) M of a point mass at offset d."""
+    """Inertia tensor M (d·d 1 - d dᵀ) of a point mass M [kg] at the offset d (3,) [m]."""
     return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 
 def parallel_axis(inertia: ArrayLike, mass: float, offset: ArrayLike) -> np.ndarray:
-    """Inertia about a point other than the centre of mass (Steiner's theorem).
+    """Inertia tensor about another point than the centre of mass (Steiner's theorem).
 
     Parameters
     ----------
     inertia : (3, 3)
-        [kg m²] about the centre of mass.
+        Inertia tensor about the centre of mass [kg m²].
     mass : float
-        [kg].
+        Mass [kg].
     offset : (3,)
-        [m] between the centre of mass and the other point, same axes; its sign does not matter.
+        Vector d between the centre of mass and the other point [m], along the axes of `inertia`; its sign does not
+        matter.
 
     Returns
     -------
     (3, 3) float64
-        inertia + mass (d·d 1 - d dᵀ), same axes.
+        inertia + mass (d·d 1 - d dᵀ), along the same axes [kg m²].
     """
     return _floats(inertia, (3, 3), "inertia") + _displaced(
         _floats(offset, (3,), "offset"), float(_positive(mass, (), "mass"))
@@ -172,7 +179,7 @@ def parallel_axis(inertia: ArrayLike, mass: float, offset: ArrayLike) -> np.ndar
 
 
 def rotate(inertia: ArrayLike, R: ArrayLike) -> np.ndarray:
-    """The tensor R I Rᵀ of a body turned by the rotation matrix R (3, 3), symmetric bit for bit."""
+    """Inertia tensor R I Rᵀ of a body that is turned by the rotation matrix `R` (3, 3); exactly symmetric."""
     R = _floats(R, (3, 3), "R")
     if np.abs(R.T @ R - np.eye(3)).max() > RELATIVE_TOLERANCE or np.linalg.det(R) < 0:
         raise ValueError(f"R is {R!r}; allowed is a rotation matrix: RᵀR = 1 and det R = 1")
@@ -182,16 +189,16 @@ def rotate(inertia: ArrayLike, R: ArrayLike) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class MassProperties:
-    """Mass, centre of mass and inertia tensor of a body, in one frame.
+    """Mass, centre of mass and inertia tensor of a body, all in one frame.
 
     Attributes
     ----------
     mass : float
-        [kg], greater than 0.
+        Mass [kg], greater than 0.
     centre : (3,) float64, read-only
         Centre of mass [m].
     inertia : (3, 3) float64, read-only
-        [kg m²] about `centre`.
+        Inertia tensor about `centre` [kg m²].
     """
 
     mass: float
@@ -206,13 +213,19 @@ class MassProperties:
             object.__setattr__(self, name, array)
 
     def placed(self, pos: ArrayLike = (0, 0, 0), R: ArrayLike | None = None) -> MassProperties:
-        """Same body in another frame, in which its frame has the origin `pos` (3,) [m] and axes R (3, 3)."""
+        """Mass properties of the same body in another frame.
+
+        In that frame the old frame has its origin at `pos` (3,) [m], and its axes are the columns of `R` (3, 3).
+        """
         R = np.eye(3) if R is None else _floats(R, (3, 3), "R")
         return MassProperties(self.mass, _floats(pos, (3,), "pos") + R @ self.centre, rotate(self.inertia, R))
 
 
 def compose(parts: Sequence[MassProperties]) -> MassProperties:
-    """Mass properties of rigidly joined parts, all in one frame (see `MassProperties.placed`)."""
+    """Mass properties of a body made of rigidly joined parts, which must all be in one frame.
+
+    `MassProperties.placed` brings a part into that frame.
+    """
     parts = tuple(parts)
     if not parts:
         raise ValueError("parts is empty; allowed is one part or more")
@@ -242,16 +255,16 @@ def principal_axes(inertia: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     Parameters
     ----------
     inertia : (3, 3)
-        [kg m²], symmetric.
+        Symmetric tensor [kg m²].
 
     Returns
     -------
     moments : (3,) float64
-        [kg m²], in the order of the columns of R.
+        Principal moments [kg m²], in the order of the columns of R.
     R : (3, 3) float64
-        Proper rotation, principal frame to the frame of `inertia`. Of the 24 that
-        put the axes in another order or direction, the one nearest to the
-        identity (largest trace). A tensor that is diagonal, up to
+        Rotation from the principal frame to the frame of `inertia`. Of the 24
+        possible ones, which differ in order and direction of the axes, it is the
+        nearest to the identity (largest trace). A tensor that is diagonal, up to
         `DIAGONAL_TOLERANCE`, gives the identity and its diagonal bit for bit.
     """
     inertia = _floats(inertia, (3, 3), "inertia")
@@ -270,12 +283,12 @@ def principal_axes(inertia: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_range(masses: np.ndarray, moments: np.ndarray) -> None:
-    """Refuse masses (n,) [kg] and principal moments (n, 3) [kg m²] with infinite inverses.
+    """Refuse masses (n,) [kg] and principal moments (n, 3) [kg m²] whose inverses would leave the range of floats.
 
     Raises
     ------
     ValueError
-        Naming the first body's mass and moments that do not lie between `LEAST` and its inverse.
+        A number is not between `LEAST` and 1 / `LEAST`. The message names mass and moments of the first such body.
     """
     numbers = np.concatenate((masses[:, None], moments), axis=1)
     good = (numbers >= LEAST) & (numbers <= 1 / LEAST)
@@ -288,14 +301,14 @@ def check_range(masses: np.ndarray, moments: np.ndarray) -> None:
 
 
 def check_inertia(inertia: ArrayLike, field: str) -> np.ndarray:
-    """Inertia tensor of a body that can move; ValueError with the reason if there is none.
+    """Check that a body can have this inertia tensor; return it as an exactly symmetric matrix.
 
     Parameters
     ----------
     inertia : (3, 3), or (3,) principal moments
-        [kg m²] about the centre of mass.
+        Inertia about the centre of mass [kg m²].
     field : str
-        What the message calls it.
+        Name of the argument in messages.
 
     Returns
     -------
@@ -305,9 +318,9 @@ def check_inertia(inertia: ArrayLike, field: str) -> np.ndarray:
     Raises
     ------
     ValueError
-        Unless it is finite, symmetric and positive definite, and no principal moment
-        exceeds the sum of the other two (equal: a flat body); each up to
-        `RELATIVE_TOLERANCE` of the largest moment. Names the field, the value and the rule.
+        The tensor is not finite, symmetric and positive definite, or a principal moment
+        exceeds the sum of the other two (it equals the sum for a flat body). Both rules hold
+        up to `RELATIVE_TOLERANCE` of the largest moment. The message names field, value and rule.
     """
     try:
         flat = np.ndim(inertia) == 1

@@ -1,7 +1,7 @@
-"""Convex hull of points as a polyhedron: corners, polygons, edges, and mass properties.
+"""Convex hull of points as a polyhedron: corners, polygonal faces, edges, and mass properties.
 
-Qhull (scipy.spatial) makes the hull; its triangles are joined to polygons here, because a face of two triangles has a
-diagonal that is no edge, and triangles that should be one plane differ by rounding.
+Qhull (scipy.spatial) computes the hull as triangles. They are joined to polygons here: a face of two triangles has a
+diagonal that is no edge, and triangles of one plane differ by rounding.
 
 References
 ----------
@@ -27,39 +27,40 @@ from physics.summary import fields_repr
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
-# Corners at most: names of contacts count a polygon's edges in 6 bits (`kernels.many.hull_hull`), and two hulls with e
-# edges each are compared in e² pairs.
+# Largest number of corners: names of contacts count a polygon's edges in 6 bits, and the narrow phase compares e² pairs
+# of edges of two hulls with e edges each.
 MOST_CORNERS = 64
 
-# Triangles are one face where they lie within this share of the radius of one plane: a thousandth of the default
-# `Accuracy.slop`, so that no contact can tell the difference; a million times the rounding of turned coordinates.
+# Triangles belong to one face if they lie within this share of the radius of one plane. This is a thousandth of the
+# default `Accuracy.slop`, too little for any contact, and a million times the rounding of turned coordinates.
 COPLANAR = 1e-9
 
-# What the sums of the mass properties may lose, relative to their largest: about two hundred terms of a few rounded
-# products each. What is smaller is 0: a symmetric hull then has its centre of mass and its axes exactly.
+# Rounding error of the sums for mass properties, relative to the largest: about two hundred terms of a few rounded
+# products each. Smaller numbers are set to 0, so that a symmetric hull has its centre of mass and its axes exactly.
 ROUNDING = 256 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False)
 class Polyhedron:
-    """A convex polyhedron of uniform density about its centre of mass.
+    """Convex polyhedron of uniform density, in coordinates relative to its centre of mass.
 
     Attributes
     ----------
     centroid : (3,) float64
-        Centre of mass, in the frame of the points that it was made of [m]. All below is relative to it.
+        Centre of mass in the coordinates of the points that the hull was made of [m].
     vertices : (v, 3) float64
-        Corners, in the order of the points [m].
+        Corners relative to `centroid`, in the order of the points [m].
     normals : (f, 3) float64
         Outward unit normals of the faces.
     loops : tuple of f tuples of int
         Corners of each face, counter-clockwise as seen from outside.
     edges : (e, 4) int64
-        First and last corner, the face on the left, that goes along the edge that way, and the face on the right.
+        First and last corner, the face on the left, whose loop goes along the edge in this direction, and the face on
+        the right.
     volume : float
-        [m³].
+        Volume [m³].
     second_moment : (3, 3) float64
-        Mean of r rᵀ over the volume [m²].
+        Mean of r rᵀ over the volume, r relative to `centroid` [m²].
     """
 
     centroid: np.ndarray
@@ -79,20 +80,20 @@ class Polyhedron:
         return float(np.linalg.norm(self.vertices, axis=1).max())
 
     def inertia(self, mass: float) -> np.ndarray:
-        """(3, 3) tensor about the centre of mass [kg m²]."""
+        """Inertia tensor (3, 3) about the centre of mass for this `mass` [kg], in kg m²."""
         S = self.second_moment
         return mass * (np.trace(S) * np.eye(3) - S)
 
 
 @lru_cache(maxsize=4096)
 def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
-    """The polyhedron of finite points.
+    """Make the convex hull of finite points [m] as a polyhedron; equal points give the same object.
 
     Raises
     ------
     ValueError
-        Saying what of `points` is not allowed: fewer than four, all within `COPLANAR` of a plane, or so near to a line
-        that the moment of inertia about it is rounding, more than `MOST_CORNERS` corners.
+        There are fewer than four points, or all lie within `COPLANAR` of a plane, or so near a line that the moment of
+        inertia about it is rounding; or the hull has more than `MOST_CORNERS` corners. The message names the reason.
     """
     if len(points) < 4:
         raise ValueError(f"points has {len(points)} of them; allowed are at least 4, not all in one plane")
@@ -117,7 +118,10 @@ def convex_hull(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
 
 
 def _second_moment(found: np.ndarray) -> np.ndarray:
-    """Mean of r rᵀ of a body with a moment of inertia about every axis; diagonal where it is to rounding."""
+    """Clean a second moment (3, 3), the mean of r rᵀ: entries off the diagonal that are rounding errors become 0.
+
+    ValueError if the moment of inertia about some axis is rounding: the points are nearly on a line.
+    """
     size = np.abs(found).max()
     found = np.where(np.eye(3, dtype=bool), found, _without_noise(found, size))
     if not np.linalg.eigvalsh(np.trace(found) * np.eye(3) - found)[0] > ROUNDING * size:
@@ -130,7 +134,10 @@ def _without_noise(values: np.ndarray, size: float) -> np.ndarray:
 
 
 def _polygons(points: np.ndarray) -> tuple[np.ndarray, tuple[tuple[int, ...], ...]]:
-    """Indices (v,) of the points that are corners, and the faces as loops of corners."""
+    """Convex hull of points (n, 3): the indices (v,) of the points that are corners, and the faces.
+
+    A face is a loop of numbers of corners, counter-clockwise as seen from outside.
+    """
     from scipy.spatial import ConvexHull, QhullError  # a quarter of a second, for those who have a hull
 
     flat = ValueError("points lie in one plane, or nearly; allowed are points that span a volume")
@@ -156,7 +163,10 @@ def _polygons(points: np.ndarray) -> tuple[np.ndarray, tuple[tuple[int, ...], ..
 
 
 def _faces(points: np.ndarray, hull: ConvexHull) -> list[list[int]]:
-    """Triangles of each face: neighbours within `COPLANAR` of the plane of the largest of them."""
+    """Join the triangles of a Qhull result to faces: lists of indices of triangles.
+
+    A face holds connected triangles within `COPLANAR` of the plane of the largest of them.
+    """
     areas = np.linalg.norm(_area_vectors(points[hull.simplices]), axis=1)
     reach = COPLANAR * np.linalg.norm(points, axis=1).max()
     is_free, faces = np.ones(len(areas), dtype=bool), []
@@ -175,12 +185,16 @@ def _faces(points: np.ndarray, hull: ConvexHull) -> list[list[int]]:
 
 
 def _area_vectors(corners: np.ndarray) -> np.ndarray:
-    """Twice the area of triangles (t, 3, 3) along their normals, (t, 3)."""
+    """Normals (t, 3) of triangles with `corners` (t, 3, 3), with twice their areas as lengths."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list[int]) -> list[int]:
-    """Corners of a face among its points, counter-clockwise as seen from outside, the least index first."""
+    """Corners of a face, as indices into `points`: counter-clockwise as seen from outside, the least index first.
+
+    `members` are the indices of all points of the face, some of which may lie on its edges. `hull` is Qhull's result,
+    and `face` lists the numbers of its triangles that form the face.
+    """
     from scipy.spatial import ConvexHull
 
     normal = hull.equations[face[0], :3]
@@ -193,7 +207,7 @@ def _around(points: np.ndarray, members: list[int], hull: ConvexHull, face: list
 
 
 def _normals(vertices: np.ndarray, loops) -> np.ndarray:
-    """Unit normals of polygons by their area vectors (Newell), which weigh all corners alike."""
+    """Outward unit normals (f, 3) of polygons, from their area vectors (Newell's method), which use all corners."""
     normals = np.empty((len(loops), 3))
     for f, loop in enumerate(loops):
         r = vertices[list(loop)] - vertices[loop[0]]
@@ -208,10 +222,11 @@ def _edges(loops) -> np.ndarray:
 
 
 def _moments(vertices: np.ndarray, loops) -> tuple[float, np.ndarray, np.ndarray]:
-    """Volume and its integrals of r and r rᵀ, by signed tetrahedra from the origin to triangles of the faces.
+    """Volume of a polyhedron, and the integrals of r and r rᵀ over it.
 
-    Over the tetrahedron (0, a, b, c) of volume D/6, D = a·(b x c), the mean of r is s/4 with s = a + b + c, and that of
-    r rᵀ is (s sᵀ + a aᵀ + b bᵀ + c cᵀ)/20.
+    They are sums over signed tetrahedra from the origin to triangles of the faces. A tetrahedron (0, a, b, c) has the
+    volume D/6 with D = a·(b x c). The mean of r over it is s/4 with s = a + b + c, and the mean of r rᵀ is
+    (s sᵀ + a aᵀ + b bᵀ + c cᵀ)/20.
     """
     corners = np.array([vertices[[loop[0], *pair]] for loop in loops for pair in pairwise(loop[1:])])
     volumes = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6

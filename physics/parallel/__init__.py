@@ -1,1 +1,1 @@
-"""Threads that share a batch of worlds, and locks that keep a world to one thread."""
+"""Threads that share a batch of worlds, bound calls of kernels, and locks that let one thread at a time use a world."""

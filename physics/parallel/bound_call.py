@@ -1,4 +1,4 @@
-"""Compile kernels for the types of their arguments, and bind them to the arguments."""
+"""Compilation of kernels for the types of given arguments, and calls of kernels with bound arguments."""
 
 from __future__ import annotations
 
@@ -19,40 +19,43 @@ else:
 
 __all__ = ["BoundCall", "bound", "bound_alike", "compiled", "compiled_entry", "compiling", "loop_kernel", "perform_all"]
 
-# Seconds after which the first step of a plan says that it is compiling.
+# Time after which a compilation is announced on standard error [s].
 COMPILE_NOTICE = 1.0
 
 
 def compiled(kernel: Callable, arguments: tuple) -> Callable:
-    """Machine code of a kernel for arguments of these types.
+    """Compile a kernel for arguments of the types of `arguments`; return a function that calls the machine code.
 
-    A call of machine code skips Numba's dispatcher, which determines the types of all arguments in each call.
+    Its calls skip Numba's dispatcher, which would determine the types of all arguments in each call.
     """
     with backend.LOCK, compiling():
         return backend.machine_code(kernel, arguments)
 
 
 def compiled_entry(kernel: Callable, arguments: tuple):
-    """Entry of a kernel that returns nothing, for arguments of these types, as `BoundCall` takes it."""
+    """Compile a kernel that returns nothing for arguments of these types; return its entry, as `BoundCall` takes it."""
     with backend.LOCK, compiling():
         return entry(kernel, arguments)
 
 
 def bound(kernel: Callable, *arguments) -> BoundCall:
-    """Bind a kernel that returns nothing to its arguments, for many calls.
+    """Compile a kernel that returns nothing and bind it to its arguments, for many calls.
 
     Parameters
     ----------
     kernel : Callable
-        Of `physics.compiler.decorators.kernel`.
+        Kernel, made by `physics.compiler.decorators.kernel`.
     *arguments
-        Arrays are bound, not copied: a call reads their contents at its time.
+        Arguments of every call. Arrays are not copied: each call reads their contents at that time.
     """
     return BoundCall([(compiled_entry(kernel, arguments), arguments)])
 
 
 def bound_alike(key, kernel: Callable, *arguments) -> BoundCall:
-    """Bind a kernel whose types of arguments follow from it and a `key`; this saves the slow look at each argument."""
+    """Bind a kernel to its arguments as `bound` does, quicker if the same kernel and `key` were bound before.
+
+    Equal kernels and keys must mean equal types of arguments, which are determined at the first call only.
+    """
     if (kernel, key) not in _ENTRIES:
         _ENTRIES[kernel, key] = compiled_entry(kernel, arguments)
     return BoundCall([(_ENTRIES[kernel, key], arguments)])
@@ -63,10 +66,10 @@ _ENTRIES: dict[tuple, object] = {}
 
 @contextmanager
 def compiling():
-    """Print on standard error that a kernel is being compiled, if this takes noticeably long.
+    """Context manager around a compilation: it prints a line on standard error if that takes noticeably long.
 
-    Meanwhile the garbage collector scans Numba's growing tables less often; it would take a tenth or a fifth of the
-    time.
+    Within it the garbage collector runs less often, since its scans of Numba's growing tables would take a tenth or a
+    fifth of the time.
     """
     is_over = threading.Event()
     before = gc.get_threshold()
@@ -81,7 +84,10 @@ def compiling():
 
 
 def _tell(count: Callable[[], int], is_over: threading.Event) -> None:
-    """Print a line as soon as something compiles and some time has passed; loading alone is not worth one."""
+    """Print a line once `COMPILE_NOTICE` has passed and `count()`, the number of compilations, is above 0.
+
+    Nothing is printed if `is_over` is set before.
+    """
     while not is_over.wait(COMPILE_NOTICE):
         if count() > 0:
             text = "rigid-env: compiling a kernel for this scene (it is kept for later runs) ..."

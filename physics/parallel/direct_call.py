@@ -1,4 +1,4 @@
-"""Calls of kernels from Python, one after another."""
+"""Bound calls of kernels that Python makes, for compilers without prepared calls."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from physics.compiler.decorators import backend
 
 
 def loop_kernel(function: Callable) -> Callable:
-    """Leave a loop that makes calls to Python."""
+    """Decorator of a loop that makes bound calls: here the loop stays a Python function."""
     return function
 
 
 def perform_all(call: DirectCall, count: int) -> bool:
-    """Make all calls, whatever their `count`; False, or the exception that one raised."""
+    """Make all calls of `call`; `count` is not used. Return False; an exception of a call is passed on."""
     return call.perform()
 
 
 class DirectCall:
-    """Calls of kernels with all their arguments.
+    """Calls of kernels with bound arguments, made one after another from Python.
 
     Parameters
     ----------
     calls : list of (callable, tuple)
-        A kernel's machine code (`entry`) and its arguments. Arrays are bound, not copied: a call reads
-        their contents at its time.
+        Machine code of a kernel (`entry`), and its arguments. Arrays are not copied: each call reads their contents at
+        that time.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class DirectCall:
         return self, len(self._calls)
 
     def perform(self) -> bool:
-        """Make the calls until one raises an exception, which leaves this function, too. Returns False."""
+        """Make the calls; return False. The first exception ends them and is passed on."""
         for code, arguments in self._calls:
             code(*arguments)
         return False
@@ -48,20 +48,20 @@ class DirectCall:
     __call__ = perform
 
     def raise_again(self) -> None:
-        """Do nothing: `perform` has raised the exception."""
+        """Do nothing, since `perform` passes exceptions on."""
 
     def forget(self) -> None:
-        """Do nothing: no exception is kept."""
+        """Do nothing, since exceptions are not kept."""
 
     def put(self, argument: int, value: float | tuple) -> None:
-        """Replace an argument of the first call."""
+        """Replace argument number `argument` of the first call by `value`."""
         self._calls[0][1][argument] = value
 
     def then(self, other: DirectCall) -> DirectCall:
-        """Join these calls with others after them."""
+        """Join these calls with those of `other`, which are made after them."""
         return DirectCall([*self._calls, *other._calls])
 
 
 def entry(kernel: Callable, arguments: tuple) -> Callable:
-    """Machine code of a kernel for arguments of these types, compiled where it is not yet; a `loop_kernel` as it is."""
+    """Compile a kernel for arguments of these types; return its machine code. A `loop_kernel` is returned unchanged."""
     return backend.machine_code(kernel, arguments) if backend.is_kernel(kernel) else kernel

@@ -1,10 +1,10 @@
 """Locks that let one thread at a time use a world or an environment.
 
-A world lends its arrays to machine code, which runs without the interpreter's lock: two steps at once would write to
-the same memory. A thread that comes while another one is at it gets an error.
+Machine code uses the arrays of a world without the interpreter's lock, so two steps at once would write to the same
+memory. A thread that uses a world while another thread does gets an error.
 
-Both are `Exclusive`. A method that `exclusive` decorates begins and ends with the lines that are written there. Where
-the call of a decorator is too slow they stand in the method: `Stepper.__call__`, `World.step`, `RigidEnv.step`.
+Worlds and environments are subclasses of `Exclusive`. Their methods are decorated with `exclusive`. Where the cost of a
+decorator matters, a method contains its lines instead: `Stepper.__call__`, `World.step`, `RigidEnv.step`.
 """
 
 from __future__ import annotations
@@ -20,30 +20,31 @@ from physics.annotations import Function
 
 
 class _Flag:
-    """Thing for one thread at a time, where the interpreter has a lock.
+    """Base of objects for one thread at a time, for interpreters with a global lock.
 
-    CPython (3.10 to 3.13) never switches threads between the two bytecodes that test and set `is_free`, nor does it
-    handle a signal there: the branch that is not taken has neither a call nor a jump. A lock of `threading` takes a
-    tenth of a step.
+    A thread may use the object if it finds `is_free` True, and sets it to False; afterwards it sets it to True. CPython
+    (3.10 to 3.13) neither switches threads nor handles a signal between the bytecodes that test and set `is_free`,
+    since there is no call or jump between them. A lock of `threading` would take a tenth of a step.
     """
 
     is_free = True
 
     @property
     def is_in_use(self) -> bool:
-        """True while a thread is at it."""
+        """True while a thread uses the object."""
         return not self.is_free
 
 
 class _Entry:
-    """Thing for one thread at a time, where the interpreter has no lock: who asks `is_free`, and is told so, has it.
+    """Base of objects for one thread at a time, for interpreters without a global lock.
 
-    `dict.setdefault` is one operation, of which one thread is the first.
+    A thread that reads `is_free` and gets True has thereby taken the object, until it sets `is_free` to True. Taking is
+    one atomic operation, `dict.setdefault`, in which only one thread is the first.
     """
 
     @property
     def is_free(self) -> bool:
-        """True for the one thread that has the thing from now on, until it sets this to True again."""
+        """Take the object: True if no other thread has it; this thread then has it until it sets `is_free` to True."""
         mine = object()
         return vars(self).setdefault("_user", mine) is mine
 
@@ -54,7 +55,7 @@ class _Entry:
 
     @property
     def is_in_use(self) -> bool:
-        """True while a thread is at it."""
+        """True while a thread uses the object."""
         return "_user" in vars(self)
 
 
@@ -66,17 +67,18 @@ else:
 
 
 def exclusive(method: Function) -> Function:
-    """Make a method or function that raises an error while another thread uses the same object.
+    """Decorate a method or function: it raises an error while another thread uses the same object.
 
     Parameters
     ----------
     method : Callable
-        Its first argument is `Exclusive`, and may have `telling` (`World`).
+        Method or function whose first argument is an `Exclusive`. If that has an attribute `telling`, the thread with
+        this identifier may call the method although the object is in use (see `World`).
 
     Returns
     -------
     Callable
-        Raises RuntimeError, with nothing changed.
+        Function that raises a RuntimeError if another thread uses the object, and otherwise calls `method`.
     """
 
     @wraps(method)
@@ -96,7 +98,7 @@ def exclusive(method: Function) -> Function:
 
 
 def in_use(thing: Any) -> RuntimeError:
-    """Error for a call while another thread uses the object."""
+    """Make the error for a call while another thread uses the object `thing`."""
     name = type(thing).__name__
     if getattr(thing, "is_torn", False):
         return RuntimeError(
@@ -113,12 +115,15 @@ _WORLDS: weakref.WeakSet = weakref.WeakSet()
 
 
 def watch(world: Any) -> None:
-    """Register a world, to unlock it after a fork of the process."""
+    """Register a world, so that a fork of the process can mark it as torn, in the middle of another thread's step."""
     _WORLDS.add(world)
 
 
 def _after_fork() -> None:
-    """Unlock all worlds in a child process: the parent's threads inside a step do not exist there."""
+    """Mark worlds in a forked child process as torn if another thread was using them.
+
+    That thread does not exist in the child and cannot finish its step.
+    """
     for world in list(_WORLDS):
         world.is_torn = world.is_in_use and world.telling != threading.get_ident()
 

@@ -1,4 +1,7 @@
-"""Calls of kernels from machine code, with arguments prepared in memory (`fused.prepared_entry`)."""
+"""Bound calls of kernels that machine code makes, with arguments prepared in memory; for the compiler `fused`.
+
+`physics.compiler.fused.prepared_entry` makes the entries of kernels that such calls use.
+"""
 
 from __future__ import annotations
 
@@ -20,26 +23,26 @@ from physics.compiler.fused.prepared_calls import (
 )
 from physics.kernels.parallel.prepared_calls import reraise, run_job, run_jobs
 
-loop_kernel, perform_all = kernel, run_jobs  # decorator of a loop that makes calls, and how it makes those it is handed
+loop_kernel, perform_all = kernel, run_jobs  # decorator of a loop that makes bound calls; function that makes them
 
 
 class PreparedCall:
-    """Calls of kernels with all their arguments, made one after another in machine code.
+    """Calls of kernels with bound arguments, made one after another in machine code.
 
     Parameters
     ----------
     calls : list of (int, tuple)
-        A kernel's entry (`entry`) and its arguments. Arrays are bound, not copied: a call reads their contents at its
+        Entry of a kernel (`entry`), and its arguments. Arrays are not copied: each call reads their contents at that
         time.
     words : list of array, optional
-        Their arguments as a kernel finds them, where others have them already; they are shared.
+        Prepared arguments of each call, as `_words` makes them, if another object has them already; they are shared.
 
     Attributes
     ----------
     jobs, count : int
-        Address of the table of these calls, and their number: what `physics.kernels.parallel.prepared_calls` is told.
+        Address of the table of these calls, and their number, for `physics.kernels.parallel.prepared_calls`.
     perform : callable
-        Makes the calls; whether one raised something, which `reraise` raises.
+        Makes the calls and returns whether one raised an exception, which `raise_again` then raises.
     handed : tuple
         Arguments of `perform_all` for these calls.
     """
@@ -59,31 +62,31 @@ class PreparedCall:
             self.perform = partial(_performing(), self.jobs, self.count)
 
     def __call__(self) -> None:
-        """Make the calls."""
+        """Make the calls; an exception of one is raised."""
         if self.perform():
             self.raise_again()
 
     def raise_again(self) -> None:
-        """Raise the exception of the last calls, if there was one."""
+        """Raise the exception that a call of the last `perform` raised, if there was one."""
         for row in self._table:
             reraise(row[JOB_STATUS], row[JOB_EXCEPTION])
 
     def forget(self) -> None:
-        """Clear the exceptions of all calls."""
+        """Forget the exceptions of all calls."""
         self._table[:, JOB_STATUS] = 0
 
     def put(self, argument: int, value: float | tuple) -> None:
-        """Replace an argument of the first call: a number, or a group of as many numbers."""
+        """Replace argument number `argument` of the first call by another number, or group of as many numbers."""
         words, place = _words((value,)), self._places[argument]
         self._words[0][place : place + len(words)] = words
 
     @cached_property
     def _places(self) -> list[int]:
-        """Offsets of the words of each argument of the first call."""
+        """Index of the first word of each argument of the first call."""
         return list(accumulate((len(_words((value,))) for value in self._calls[0][1]), initial=0))
 
     def then(self, other: PreparedCall) -> PreparedCall:
-        """Join these calls with others after them; `put` changes the arguments of both."""
+        """Join these calls with those of `other`, made after them. Arguments are shared: `put` acts in both objects."""
         return PreparedCall([*self._calls, *other._calls], [*self._words, *other._words])
 
 
@@ -98,7 +101,7 @@ def _performing_one() -> Callable[[int], bool]:
 
 
 def _words(arguments: tuple) -> list[int]:
-    """Words of the arguments as a kernel reads them from memory: see `physics.compiler.fused.prepared_entry`."""
+    """Convert arguments to 64-bit words, as an entry of `physics.compiler.fused.prepared_entry` reads them."""
     words: list[int] = []
     for value in arguments:
         if isinstance(value, np.ndarray):
@@ -113,6 +116,9 @@ def _words(arguments: tuple) -> list[int]:
 
 
 def entry(kernel: Callable, arguments: tuple) -> int:
-    """Entry of a kernel that returns nothing, for arguments of these types; compiles it if necessary."""
-    with backend.LOCK:  # nobody else adds to what is linked meanwhile
+    """Address of the prepared entry of a kernel that returns nothing, for arguments of these types.
+
+    The kernel is compiled if necessary.
+    """
+    with backend.LOCK:  # no other thread may link machine code meanwhile
         return kernel.ready_entry(backend.machine_code(kernel, arguments))

@@ -1,4 +1,4 @@
-"""Processors of a process: their usable number, and system functions for threads that share them."""
+"""Processors of this machine: number that the process may use, and addresses of system functions for its threads."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pathlib import Path
 
 
 def usable(root: Path = Path("/")) -> int:
-    """Count the processors that the process may use at once, by its affinity and its container's quota.
+    """Count the processors that the process may use at once, from its affinity and its container's quota.
 
     Parameters
     ----------
     root : Path
-        Where the system's files are.
+        Root of the file system, whose files of control groups are read.
 
     Returns
     -------
@@ -29,7 +29,7 @@ def usable(root: Path = Path("/")) -> int:
 
 
 def quota(root: Path = Path("/")) -> float:
-    """Least share of processors that Linux's control groups grant the process, inf without a limit.
+    """Number of processors that Linux's control groups grant the process, possibly a fraction; inf without a limit.
 
     A group's limit holds for the groups inside it. Version 2 writes it in `cpu.max`, version 1 in `cpu.cfs_quota_us`.
     """
@@ -37,7 +37,7 @@ def quota(root: Path = Path("/")) -> float:
 
 
 def _groups(root: Path) -> Iterator[Path]:
-    """Folders of the control groups of the process, outer groups included."""
+    """Iterate over the folders of the control groups of the process, outer groups included."""
     mounts = root / "sys/fs/cgroup"
     for line in _text(root / "proc/self/cgroup").splitlines():
         _, names, place = line.split(":", 2)
@@ -50,7 +50,7 @@ def _groups(root: Path) -> Iterator[Path]:
 
 
 def _share(group: Path) -> float:
-    """Number of processors that one group's limit grants; inf without a limit."""
+    """Number of processors that the limit of one control group grants; inf without a limit."""
     limit, period = (*_text(group / "cpu.max").split(), "", "")[:2]
     if not period:
         limit, period = _text(group / "cpu.cfs_quota_us"), _text(group / "cpu.cfs_period_us")
@@ -69,12 +69,12 @@ def _text(path: Path) -> str:
 
 
 def giving_way() -> int:
-    """Address of the system's function that yields the processor to another thread; 0 without one."""
+    """Address of the system function that yields the processor to another thread; 0 if there is none."""
     return _address("SwitchToThread" if os.name == "nt" else "sched_yield")
 
 
 def telling() -> int:
-    """Address of the system's function that returns the processor of a thread; 0 without one."""
+    """Address of the system function that returns the number of the calling thread's processor; 0 if there is none."""
     return _address("GetCurrentProcessorNumber" if os.name == "nt" else "sched_getcpu")
 
 

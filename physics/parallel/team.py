@@ -1,4 +1,4 @@
-"""Threads that share a batch, as the compiler of kernels allows."""
+"""Thread team of a batch, `Team`: work stealing with the compiler `fused`, fixed ranges with other compilers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["Team", "listed"]
 
 
 def listed(worlds: np.ndarray) -> np.ndarray:
-    """List (TAKEN_FIRST_WORLD + n,) int64 of worlds (n,), in the form of a thread's taken worlds."""
+    """Make a list of taken worlds (TAKEN_FIRST_WORLD + n,) int64 from the indices `worlds` (n,), as threads keep it."""
     taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
     taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
     return taken

@@ -1,4 +1,4 @@
-"""Share a batch of worlds among a pool of threads, each with its own range of worlds."""
+"""Thread team for compilers without atomic operations: each thread has a fixed range of the worlds of a batch."""
 
 from __future__ import annotations
 
@@ -13,22 +13,23 @@ from physics.parallel.bound_call import BoundCall
 
 
 class Pool:
-    """Threads that share a batch evenly: `thread_team.Team` without atomics.
+    """Threads that share the worlds of a batch in equal ranges; same interface as `thread_team.Team`.
 
     Parameters
     ----------
     threads : int
+        Number of threads; at most one for each world is used.
     worlds : int
-        Size of the batch.
+        Number of worlds of the batch.
 
     Attributes
     ----------
     size : int
-        Number of threads.
+        Number of threads in use.
     taken : (size, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64
-        For each thread the worlds that it took in the last run.
+        For each thread the list of worlds that it stepped in the last run.
     queues : list of WorkQueue
-        Of each thread: its range alone.
+        For each thread the queue with its range of worlds.
     """
 
     def __init__(self, threads: int, worlds: int):
@@ -43,7 +44,7 @@ class Pool:
         self._pid = -1
 
     def run(self, calls: Sequence[BoundCall]) -> None:
-        """Make the calls, one per thread, the first in the calling thread; raise the exception of one of them."""
+        """Make the calls, one in each thread and the first in the calling thread; an exception of one is raised."""
         if self.size == 1:
             calls[0].perform()
             return
@@ -58,7 +59,7 @@ class Pool:
             other.result()
 
     def close(self) -> None:
-        """End the threads; the pool can be used again."""
+        """End the threads; the next `run` starts new ones."""
         if self._pool is not None and self._pid == os.getpid():
             self._pool.shutdown()
         self._pool = None

@@ -1,13 +1,13 @@
-"""Share a batch of worlds among threads: kernels release the GIL, so a thread pool is enough.
+"""Thread team that shares the worlds of a batch; kernels release the GIL, so a pool of Python threads is enough.
 
-The pool is made when first needed and belongs to one process: after a fork the child makes its own. There is no
-threading layer of Numba in it, so worlds may be stepped from several Python threads at once, and forked. What the pool
-runs is a loop in machine code (`physics.kernels.parallel.spin_wait_workers`), in which a thread stays from one run to
-the next if that comes soon. A thread that waits there lets other programs have its processor, and nobody waits for a
-thread that has not begun.
+The pool is made at the first run and belongs to one process: after a fork the child makes its own. It does not use
+Numba's threading layer, so worlds may be stepped from several Python threads at once, and a process may be forked. The
+threads run a loop in machine code (`physics.kernels.parallel.spin_wait_workers`), in which a thread waits for the next
+run for a short time. A waiting thread yields its processor to other programs, and no run waits for a thread that has
+not begun its part.
 
-At most as many threads take part as there are processors. The environment variable ``RIGID_ENV_THREADS=fixed`` makes
-all of them take part, and none give way.
+At most as many threads take part as there are usable processors. With the environment variable
+``RIGID_ENV_THREADS=fixed`` all threads take part, and waiting threads do not yield.
 """
 
 from __future__ import annotations
@@ -26,41 +26,43 @@ from physics.kernels.state.groups import WorkQueue
 from physics.parallel import processors
 from physics.parallel.bound_call import BoundCall, compiled
 
-# So many worlds a thread takes at once, or fewer where there are few: worlds in contact take several times as long as
-# others, and at the end one thread waits for the other's last ones.
+# Number of worlds that a thread takes at once; fewer in small batches, so that each thread takes several times. Worlds
+# in contact take several times as long as others, and at the end threads wait for the last worlds of one of them.
 WORLDS_AT_ONCE = 8
 TURNS_PER_THREAD = 4
 
-# How long the thread that leads asks whether the others have finished before it sleeps until they say so, and how long
-# those ask whether there is more to do before they go [s]. Meanwhile they give way to other threads, so often [s].
+# The leading thread checks for PATIENCE whether the workers have finished; then it sleeps until they wake it. A worker
+# checks for STAY whether there is a next run; then it ends. Waiting threads yield their processor every BETWEEN, the
+# first time after BRIEF if the leading thread is still busy [s].
 PATIENCE = 2.0e-4
 STAY = 3.0e-4
 BETWEEN = 1.0e-4
-BRIEF = 2.5e-5  # and for the first time, if the one that leads is still busy
+BRIEF = 2.5e-5
 
-# Turns off that threads give way and that a quota counts; for measurements.
+# Environment variable for measurements: its value "fixed" makes threads ignore quotas, and not yield.
 SWITCH = "RIGID_ENV_THREADS"
 
 
 class Team:
-    """Threads that share a batch.
+    """Threads that share the worlds of a batch by work stealing.
 
     Parameters
     ----------
     threads : int
+        Number of threads; at most one for each world is used.
     worlds : int
-        Size of the batch.
+        Number of worlds of the batch.
 
     Attributes
     ----------
     size : int
-        Number of threads.
+        Number of threads in use.
     turns : (1 + size, PADDING_WORDS) int64
-        Whose turn it is, of `physics.kernels.parallel.work_stealing`.
+        Ranges of worlds that are not taken yet, of `physics.kernels.parallel.work_stealing`.
     taken : (size, TAKEN_FIRST_WORLD + worlds + PADDING_WORDS) int64
-        For each thread the worlds that it took in the last run.
+        For each thread the list of worlds that it took in the last run.
     queues : list of WorkQueue
-        Of each thread.
+        For each thread the ranges, and its list of taken worlds.
     """
 
     def __init__(self, threads: int, worlds: int):
@@ -70,16 +72,17 @@ class Team:
         self.taken = at.make_taken_lists(self.size, worlds)
         self.queues = [WorkQueue(self.turns, taken) for taken in self.taken]
         self._crew = spin_wait_workers.make_worker_table(self.size - 1)
-        self._told: Sequence[BoundCall] | None = None  # what the crew has been told to do
+        self._told: Sequence[BoundCall] | None = None  # calls that are in the crew's table
         self._futures: dict[int, Future] = {}
-        self._is_interrupted = False  # members may still be busy with the last run
+        self._is_interrupted = False  # whether workers may still be busy with the last run
         self._pool: ThreadPoolExecutor | None = None
         self._pid = -1
 
     def run(self, calls: Sequence[BoundCall]) -> None:
-        """Make the calls, one per thread, the first in the calling thread.
+        """Make the calls, one in each thread and the first in the calling thread; raise an exception that one raised.
 
-        A call is skipped if its thread has not begun before all worlds are taken; its list of worlds is then empty.
+        The call of a thread is skipped if all worlds are taken before the thread begins; its list of worlds is then
+        empty.
         """
         if self.size == 1:
             if calls[0].perform():
@@ -143,22 +146,22 @@ class Team:
             )
 
     def _send_for_all(self) -> None:
-        """Start pool threads for the members that are away."""
+        """Start pool threads for the workers that no longer wait in their loop."""
         for member in 1 + np.flatnonzero(self._crew[1:, spin_wait_workers.WORKER_WAS_IDLE]):
             self._futures[member] = self._pool.submit(self._be_member, member)
 
     def _be_member(self, member: int) -> None:
-        """Run a member in a pool thread; meanwhile the team and its prepared calls stay alive."""
+        """Run the loop of worker number `member` in a pool thread; `self` keeps the team and its calls alive."""
         self._serve(member, self._stay)
 
     def _let_go(self) -> None:
-        """Wait until all members are away."""
+        """End the loops of all workers, and wait until they have ended."""
         self._dismiss()
         for future in self._futures.values():
             future.result()
 
     def close(self) -> None:
-        """End the threads; the team can be used again."""
+        """End the threads; the next `run` starts new ones."""
         if self._pool is not None and self._pid == os.getpid():
             self._dismiss()
             self._pool.shutdown()
@@ -166,7 +169,7 @@ class Team:
 
 
 def _raise(calls: Sequence[BoundCall]) -> None:
-    """Raise the exception of one of the calls; clear all, so that a skipped call has none next time."""
+    """Raise the exception that a call raised, and forget those of all calls, so that none is raised again later."""
     try:
         for call in calls:
             call.raise_again()
@@ -176,12 +179,12 @@ def _raise(calls: Sequence[BoundCall]) -> None:
 
 
 def _pauses(seconds: float) -> int:
-    """Number of pauses in a time."""
+    """Number of `spin_pause` instructions that take about this time [s]."""
     return int(seconds / _pause()) + 1
 
 
 @cache
 def _pause() -> float:
-    """Length of a pause [s] on this processor, from the least disturbed trial."""
+    """Time of a `spin_pause` instruction on this processor [s]: the shortest of several trials."""
     pause, count = compiled(spin_wait_workers.repeat_pause, (0,)), 1000
     return min(timeit.repeat(lambda: pause(count), number=1, repeat=7)) / count

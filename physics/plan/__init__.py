@@ -1,1 +1,1 @@
-"""Plans: the parts of the engine that a scene needs at an accuracy."""
+"""Plans: the scheme, effects and settings for which the kernels of a scene are compiled."""

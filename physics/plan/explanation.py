@@ -1,4 +1,4 @@
-"""Rows of a plan, one for each effect: on or off, the reason, and the kernels compiled for it."""
+"""Explanation of a plan, a row for each effect: on or off, the reason, and the code compiled for it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.scene.force_fields import FIELDS
 
 @dataclass(frozen=True)
 class Row:
-    """One effect in the plan."""
+    """Row of a plan's explanation: an effect, whether it is on, the reason, and the code compiled for it in words."""
 
     effect: str
     is_on: bool
@@ -87,7 +87,7 @@ def _counted(count: int, what: str) -> str:
 
 
 def _field_rows(fields: tuple[FieldSlot, ...]) -> list[Row]:
-    """Rows of the declared fields, then of the built-in fields that are not."""
+    """Rows of the declared force fields, then of the built-in fields that the scene does not declare."""
     rows = [
         Row(slot.effects[0].label, True, f"declared: {', '.join(map(repr, slot.effects))}",
             f"{_counted(slot.term.count * slot.term.size, 'parameter')} per body, one function"
@@ -147,7 +147,10 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
 
 
 def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
-    """All rows of a plan; `needs` are those of the scene (`physics.scene.needs`)."""
+    """Make all rows of a plan from the needs of its scene (`physics.scene.needs`) and its accuracy.
+
+    `refined` tells whether error control cuts substeps into parts.
+    """
     contact, friction, touching, rubbing = needs.contact, needs.friction, needs.touching, needs.rubbing
     return (
         _gravity_row(needs.gravity),

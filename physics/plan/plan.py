@@ -1,4 +1,4 @@
-"""From a scene to what is compiled: which effects are on, why, and the switches of the kernel."""
+"""Plan of a scene at an accuracy: its scheme, the switches for which kernels are compiled, and the reasons."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from physics.summary import parts_repr
 
 SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL}
 
-# Effects that a `repr` names.
+# Largest number of effects that a `repr` names.
 MOST_ROWS = 20
 
 
 @dataclass(frozen=True)
 class Plan(Switches):
-    """The switches that the kernel is compiled for, the scheme that it belongs to, and the reasons."""
+    """Switches for which the kernel of a scene is compiled, the scheme that steps it, and rows that explain them."""
 
     scheme: Scheme
     rows: tuple[Row, ...]
@@ -40,7 +40,7 @@ class Plan(Switches):
 
     @property
     def key(self) -> tuple:
-        """Key that distinguishes one compiled kernel from another."""
+        """Key of the compiled kernel: plans that need different kernels have different keys."""
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
@@ -51,34 +51,35 @@ class Plan(Switches):
 
     @property
     def may_raise(self) -> bool:
-        """True if a step may end in an exception: that of a user's field."""
+        """True if a step may end in an exception, raised by a function of a user's field."""
         return any(slot.may_raise for slot in self.fields)
 
     @property
     def field_columns(self) -> int:
-        """Columns of parameters that the fields have."""
+        """Number of columns of the force fields in the parameter table."""
         return sum(term.count * term.size for term in self.terms)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """True if the kernel of this plan can turn bodies with these `physics.mass.inertia.principal_axes`.
+        """True for bodies with whose inertia the kernel of this plan can compute the rotation.
 
         Parameters
         ----------
         moments : (n, 3) float64
-            [kg m²].
+            Principal moments of n bodies [kg m²], as of `physics.mass.inertia.principal_axes`.
         R : (n, 3, 3) float64
-            Principal frame to body frame.
+            Rotations from the principal frame to the body frame.
 
         Returns
         -------
         (n,) bool
+            False where the kernel lacks the gyroscopic torque or the principal axes that the body needs.
         """
         if not self.gyroscopic:
             return is_isotropic(moments)
         return ~is_tilted(R) | bool(self.offset_frame)
 
     def explain(self) -> str:
-        """The plan as text: every effect, on or off, why, and what is compiled for it."""
+        """Explain the plan in a line for each effect: on or off, the reason, and the code compiled for it."""
         width = max(len(row.effect) for row in self.rows)
         lines = [
             f"{row.effect:<{width}}  {'on ' if row.is_on else 'off'}  {row.reason}"
@@ -89,12 +90,12 @@ class Plan(Switches):
 
 
 def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
-    """Decide what a scene needs at an accuracy, or the preset of that name.
+    """Choose the scheme, and the effects to compile, for a scene at an accuracy or a preset's name.
 
     Raises
     ------
     ValueError
-        No scheme can step the scene at this accuracy; the message names what it does not know.
+        No scheme can step the scene at this accuracy; the message names the effect that is not supported.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     accuracy = resolve(accuracy)

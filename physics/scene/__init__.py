@@ -1,1 +1,1 @@
-"""Descriptions of scenes: bodies, walls, effects. No numerics beyond mass properties."""
+"""Scenes: immutable descriptions of bodies, walls and effects, whose only numerics are mass properties."""

@@ -1,4 +1,4 @@
-"""The bodies of a scene: immutable descriptions, no numerics beyond their mass properties."""
+"""Bodies of a scene: immutable descriptions of shape, mass and start; their only numerics are mass properties."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
 from physics.summary import fields_repr, shown
 
-FROM_DENSITY: Any = None  # a body has a mass as soon as it is made
+FROM_DENSITY: Any = None  # default of `mass`, replaced by density times volume when the body is made
 
 
 def _tuple(array: ArrayLike) -> Any:
@@ -25,7 +25,7 @@ def _tuple(array: ArrayLike) -> Any:
 
 
 def check_name(name: str) -> None:
-    """Refuse a body's name that is no text or empty, or has unprintable characters or outer blanks."""
+    """Raise a ValueError if a body's name is no text, is empty, or has unprintable characters or outer blanks."""
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable():
         raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
 
@@ -58,9 +58,9 @@ else:
 class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
-    Friction and restitution are those of the scene's `Friction` and `Contact`, or of `World.set_parameters` for each
-    body. Two bodies that touch have the geometric mean of their frictions and the larger restitution; a wall has the
-    body's.
+    The coefficients of friction and restitution are those of the scene's `Friction` and `Contact`, or those that
+    `World.set_parameters` gives to each body. Two bodies that touch have the geometric mean of their frictions and the
+    larger restitution; at a wall the body's own coefficients act.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ class Body(_Shape):
     inertia_body : (3,) or (3, 3) array_like, optional
         Moments, or tensor, about the centre of mass in the body frame [kg m²]. None: uniform density.
     density : float, optional
-        Instead of `mass` [kg/m³]: the body has this times its `volume` as its mass, and None here.
+        Density [kg/m³], given instead of `mass`, which becomes density times `volume`. The attribute is then None.
     name : str, optional
-        Name of the body in files and environments, of its own in a scene. It changes no motion.
+        Name of the body in files and environments; no other body of a scene may have it. It changes no motion.
 
     Raises
     ------
@@ -106,7 +106,7 @@ class Body(_Shape):
         self._check_range()
 
     def _set_mass(self) -> None:
-        """Set the mass, from the density if that is given."""
+        """Check mass or density, of which exactly one must be given, and set `mass` [kg]; `density` becomes None."""
         if (self.mass is None) == (self.density is None):
             raise ValueError(
                 f"mass is {shown(self.mass)} and density is {shown(self.density)}; allowed is exactly one of the two: "
@@ -119,7 +119,7 @@ class Body(_Shape):
         self._set("mass", float(validation.positive(mass, (), "mass")))
 
     def _check_range(self) -> None:
-        """Refuse a mass or inertia whose inverse is not finite."""
+        """Raise a ValueError if the mass or a moment of inertia is so small or large that its inverse is not finite."""
         with np.errstate(over="ignore", invalid="ignore"):
             moments = np.diagonal(self.inertia)
         inertia.check_range(np.array([self.mass]), moments[None])
@@ -138,19 +138,19 @@ class Body(_Shape):
 @known_keywords
 @dataclass(frozen=True)
 class Block(Body):
-    """A rectangular block; its body axes are its edges.
+    """A rectangular block, whose body axes run along its edges.
 
     Parameters
     ----------
     size : (3,) array_like
         Full edge lengths along body x, y, z [m].
     mass : float
-        [kg]; or `density` instead.
+        Mass [kg]; `density` may be given instead.
     center : (3,) array_like
         Position of the geometric centre, where the diagonals meet, relative to the centre of mass, along the body
         axes [m]: a block heavy on its +x side has a negative x here. `pos` is the centre of mass, so that the block
-        occupies the space around ``pos + R(quat) center``. Where it is not 0 the density is not uniform, and
-        `inertia_body`, about the centre of mass, must be given.
+        occupies the space around ``pos + R(quat) center``. A center other than 0 means that the density is not uniform;
+        `inertia_body`, about the centre of mass, must be given then.
     """
 
     size: Vector
@@ -186,22 +186,25 @@ class Block(Body):
 
     @property
     def volume(self) -> float:
-        """[m³]."""
+        """Volume [m³]."""
         return math.prod(self.size)
 
     @property
     def dimensions(self) -> NDArray[np.float64]:
-        """(3,) half edges [m]."""
+        """Half edge lengths (3,) along body x, y, z [m]."""
         return 0.5 * np.array(self.size)
 
     @staticmethod
     def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-        """Principal moments (..., 3) [kg m²], along the body axes, of half edges `dimensions` (..., 3) [m]."""
+        """Principal moments (..., 3) [kg m²] of uniform blocks with half edges `dimensions` (..., 3) [m].
+
+        The moments are about the body axes through the centre; `mass` (...) is in kg.
+        """
         return inertia.block_moments(2 * dimensions, mass)
 
     @staticmethod
     def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Radius (...) [m] of the sphere about the centre that holds the body."""
+        """Radius (...) [m] of the sphere about the geometric centre through all vertices, from half edges (..., 3)."""
         a, b, c = np.moveaxis(dimensions * dimensions, -1, 0)
         return np.sqrt(a + b + c)
 
@@ -214,9 +217,9 @@ class Sphere(Body):
     Parameters
     ----------
     radius : float
-        [m].
+        Radius [m].
     mass : float
-        [kg]; or `density` instead.
+        Mass [kg]; `density` may be given instead.
     """
 
     radius: float
@@ -245,22 +248,25 @@ class Sphere(Body):
 
     @property
     def volume(self) -> float:
-        """[m³]."""
+        """Volume [m³]."""
         return 4 / 3 * math.pi * math.prod((self.radius,) * 3)
 
     @property
     def dimensions(self) -> NDArray[np.float64]:
-        """(3,) the radius three times [m]."""
+        """Radius, three times (3,) [m]: semi-axes, as of an ellipsoid."""
         return np.full(3, self.radius)
 
     @staticmethod
     def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-        """Principal moments (..., 3) [kg m²] of solid spheres; `dimensions` (..., 3) as above."""
+        """Principal moments (..., 3) [kg m²] of solid spheres of `mass` (...) [kg].
+
+        `dimensions` (..., 3) is the radius, three times [m].
+        """
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
     def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The radius (...) [m]."""
+        """Radius (...) [m] of spheres with `dimensions` (..., 3), their radius three times."""
         return dimensions[..., 0]
 
 
@@ -272,9 +278,9 @@ class Ellipsoid(Body):
     Parameters
     ----------
     semi_axes : (3,) array_like
-        Along body x, y, z [m].
+        Semi-axes along body x, y, z [m].
     mass : float
-        [kg]; or `density` instead.
+        Mass [kg]; `density` may be given instead.
     """
 
     semi_axes: Vector
@@ -303,22 +309,25 @@ class Ellipsoid(Body):
 
     @property
     def volume(self) -> float:
-        """[m³]."""
+        """Volume [m³]."""
         return 4 / 3 * math.pi * math.prod(self.semi_axes)
 
     @property
     def dimensions(self) -> NDArray[np.float64]:
-        """(3,) semi-axes [m]."""
+        """Semi-axes (3,) along body x, y, z [m]."""
         return np.array(self.semi_axes)
 
     @staticmethod
     def uniform_moments(dimensions: NDArray[np.float64], mass: Any) -> NDArray[np.float64]:
-        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m]."""
+        """Principal moments (..., 3) [kg m²] of solid ellipsoids of semi-axes `dimensions` (..., 3) [m].
+
+        The moments are about the body axes; `mass` (...) is in kg.
+        """
         return inertia.ellipsoid_moments(dimensions, mass)
 
     @staticmethod
     def bounding_radius(dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The largest semi-axis (...) [m]."""
+        """Largest semi-axis (...) [m] of ellipsoids with semi-axes `dimensions` (..., 3) [m]."""
         return np.max(dimensions, axis=-1)
 
 
@@ -327,15 +336,16 @@ class Ellipsoid(Body):
 class Hull(Body):
     """The convex hull of points, of uniform density: a wedge, a prism, a rock.
 
-    `pos` is the centre of mass, as for every body: the hull is shifted there. `centroid` is the centre of mass in the
-    frame of the points. So a hull whose points are given in the world has ``pos=hull.centroid``.
+    `points` fix the shape only, and `pos` the place: the hull is shifted so that its centre of mass lies at `pos`.
+    `centroid` is the centre of mass in the coordinates of `points`. So ``pos=hull.centroid`` leaves points that are
+    world coordinates where they are.
 
     Parameters
     ----------
     points : (n, 3) array_like
-        Along the body axes, from any origin [m]. Those inside the hull do not matter.
+        Coordinates along the body axes, from any origin [m]. Points inside the hull are ignored.
     mass : float
-        [kg]; or `density` instead.
+        Mass [kg]; `density` may be given instead.
 
     Raises
     ------
@@ -375,12 +385,12 @@ class Hull(Body):
 
     @property
     def polyhedron(self) -> Polyhedron:
-        """Corners, faces and edges about the centre of mass, in the body frame; equal points share one object."""
+        """Corners, faces and edges about the centre of mass, body frame; hulls of equal points share one object."""
         return convex_hull(self.points)
 
     @property
     def centroid(self) -> Vector:
-        """Centre of mass in the frame of `points` [m]."""
+        """Centre of mass in the coordinates of `points` [m]."""
         return _tuple(self.polyhedron.centroid)
 
     @property
@@ -390,7 +400,7 @@ class Hull(Body):
 
     @property
     def volume(self) -> float:
-        """[m³]."""
+        """Volume [m³]."""
         return self.polyhedron.volume
 
     @property
@@ -399,5 +409,5 @@ class Hull(Body):
         return np.abs(self.polyhedron.vertices).max(axis=0)
 
     def bounding_radius(self, dimensions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance (...) of the farthest corner from the centre of mass [m]; `dimensions` (..., 3) do not matter."""
+        """Distance [m] of the farthest corner from the centre of mass, once for each row of `dimensions` (..., 3)."""
         return np.full(np.shape(dimensions)[:-1], self.polyhedron.radius)

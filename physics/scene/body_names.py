@@ -1,4 +1,4 @@
-"""Names of bodies: conversion to indices, and labels for messages."""
+"""Names of a scene's bodies: their indices, and their labels in messages."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from physics.summary import shown
 
 
 def body_index(value, field: str, scene: Scene, verb: str = "is") -> int:
-    """Index of a body of a scene, given by its name or index.
+    """Index of a body in `scene.bodies`, from `value`: the body's name or its index.
 
     Raises
     ------
     ValueError
-        No such body: names the field, the value and the bodies there are, the nearest name first.
+        The scene has no such body. The message begins with the words `field` and `verb`, the value follows, then the
+        names and indices of the scene's bodies, the nearest name first.
     """
     names = {body.name: b for b, body in enumerate(scene.bodies) if body.name is not None}
     if isinstance(value, str) and value in names:
@@ -29,17 +30,20 @@ def body_index(value, field: str, scene: Scene, verb: str = "is") -> int:
 
 
 def told_bodies(scene: Scene) -> str:
-    """Names and indices of a scene's bodies, for errors."""
+    """Text of an error message that lists the names and indices of a scene's bodies."""
     return _bodies(filter(None, body_names(scene)), len(scene.bodies), "")
 
 
 def body_names(scene: Scene) -> tuple[str, ...]:
-    """Names of the bodies; "" for one without a name."""
+    """Names of a scene's bodies in their order; "" for a body without a name."""
     return tuple(body.name or "" for body in scene.bodies)
 
 
 def body_label(body: int, names: tuple[str, ...]) -> str:
-    """Index of a body, and its name in brackets if it has one; `names` as of `body_names`, or empty."""
+    """Label of the body with index `body`: the index, and its name in brackets if it has one.
+
+    `names` is the tuple from `body_names`, or empty.
+    """
     name = names[body] if 0 <= body < len(names) else ""
     return f"{body} ({name})" if name else str(body)
 

@@ -1,4 +1,7 @@
-"""The canonical scenes: used by tests, benchmarks, environments and demonstrations alike."""
+"""Canonical scenes, which tests, benchmarks, environments and demonstrations share.
+
+A block in these scenes is always that of the exercise, with edges of 5 x 3 x 2 m and a mass of 6 kg.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,19 @@ def block_in_box(
     walls: Layout = "three",
     **start: Any,
 ) -> Scene:
-    """Make the block among three walls; `start` takes quat, linvel and angvel, `walls` is ``three`` or ``corner``."""
+    """Make a scene with gravity and a block of `SIZE` [m] and `MASS` [kg] among three walls.
+
+    Parameters
+    ----------
+    pos : (3,) array_like
+        Centre of mass at the start, world frame [m].
+    restitution, friction : float or None
+        Coefficients e and μ. None: plastic impacts, and no friction.
+    walls : str
+        ``three`` for `three_walls`, ``corner`` for `corner`.
+    **start
+        `quat`, `linvel` and `angvel` of the block, as of `Block`.
+    """
     layouts = {"three": lambda: three_walls(HALF_WIDTH), "corner": corner}
     if walls not in layouts:
         raise ValueError(f"walls is {walls!r}; allowed are {', '.join(layouts)}")
@@ -39,47 +54,53 @@ def block_in_box(
 
 
 def drop() -> Scene:
-    """The exercise: the block, slightly turned and spinning, falls into the three-wall box."""
+    """The exercise: a block, slightly turned and spinning, falls into a box of three walls."""
     tilt = 0.25  # [rad] about (1, 1, 0)
     s = math.sin(tilt / 2) / math.sqrt(2)
     return block_in_box((0.0, 6.0, 0.0), quat=(math.cos(tilt / 2), s, s, 0.0), angvel=(0.3, 0.2, 0.1))
 
 
 def flight() -> Scene:
-    """The block tumbling high above the floor of the three-wall box, turning near its intermediate axis."""
+    """A block tumbling in free flight high above the floor, turning nearly about its intermediate axis."""
     return block_in_box((0.0, 1e6, 0.0), angvel=(0.1, 5.0, 0.1))
 
 
 def tumble() -> Scene:
-    """The block tumbling in empty space: no gravity, no walls."""
+    """A block tumbling in empty space: no gravity, no walls."""
     return Scene([Block(SIZE, MASS, angvel=(0.1, 5.0, 0.1))])
 
 
 def rest() -> Scene:
-    """The block at rest face down on the floor of the three-wall box: four contacts."""
+    """A block at rest face down on the floor of a box of three walls: four contacts."""
     return block_in_box((0.0, SIZE[1] / 2, 0.0))
 
 
 def shove() -> Scene:
-    """The block on the floor of the three-wall box, to be shoved about by random wrenches."""
+    """A block at rest on the floor of a box of three walls, to be shoved about by random wrenches of the caller."""
     return block_in_box((0.0, SIZE[1] / 2, 0.0))
 
 
 def corner_drop() -> Scene:
-    """The block falls, turned, into the corner of three walls at right angles."""
+    """A block, turned, falls into the corner of three walls at right angles."""
     half = 0.5 * 0.7
     s = math.sin(half) / math.sqrt(3)
     return block_in_box((3.5, 5.0, 3.5), walls="corner", quat=(math.cos(half), s, s, s), linvel=(-1.5, 0.0, -1.0))
 
 
 def slide(speed: float = 3.0, friction: float = 0.3) -> Scene:
-    """The block slides over an endless floor along x until friction stops it: distance v²/(2 μ g)."""
+    """A block slides over an endless floor along x until friction stops it, after the distance v²/(2 μ g).
+
+    v is `speed` [m/s], μ is `friction`.
+    """
     body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2, 0.0), linvel=(speed, 0.0, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 
 
 def incline(angle: float, friction: float) -> Scene:
-    """The block face down on an incline that falls along +x, by `angle` [rad]; the wall is tilted, gravity is not."""
+    """A block face down on an incline that falls along +x, by `angle` [rad]; the wall is tilted, gravity is not.
+
+    `friction` is the coefficient μ.
+    """
     normal = (math.sin(angle), math.cos(angle), 0.0)
     half = SIZE[1] / 2
     body = Block(
@@ -90,22 +111,22 @@ def incline(angle: float, friction: float) -> Scene:
 
 
 def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
-    """The block dropped face down, elastic and without friction.
+    """A block dropped face down on an endless floor without friction.
 
-    The `height` [m] is that of its lowest face above the floor.
+    Its lowest face starts at `height` [m] above the floor; `restitution` is 1 for an elastic block.
     """
     body = Block(SIZE, MASS, pos=(0.0, SIZE[1] / 2 + height, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(restitution)])
 
 
 def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
-    """A sphere of radius 1 m and 1 kg set down sliding: it ends rolling at 5/7 of its speed."""
+    """A sphere of radius 1 m and 1 kg slides over the floor at `speed` [m/s] until it rolls, at 5/7 of that speed."""
     body = Sphere(1.0, 1.0, pos=(0.0, 1.0, 0.0), linvel=(speed, 0.0, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 
 
 def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
-    """The block dropped on a vertex from 1 m: turned by 0.7 rad about (1, 1, 0), at rest at first."""
+    """A block, turned by 0.7 rad about (1, 1, 0), dropped from rest with its lowest vertex 1 m above the floor."""
     half, clearance = 0.5 * 0.7, 1.0
     s = math.sin(half) / math.sqrt(2)
     # Height of the centre above the lowest vertex: Σ a_i |y·e_i|, the second row of the rotation matrix.
@@ -117,9 +138,9 @@ def vertex_drop(restitution: float = 0.3, friction: float = 0.5) -> Scene:
 
 
 def closed_box(half: float = 5.0) -> Scene:
-    """The elastic block tumbling without gravity or friction in a box of six walls: chaotic.
+    """An elastic block tumbling without gravity or friction in a closed box of six walls; the motion is chaotic.
 
-    The walls are at ±`half` [m].
+    The walls are at ±`half` [m] on all axes.
     """
     normals = [tuple(sign * (axis == k) for k in range(3)) for axis in range(3) for sign in (1.0, -1.0)]
     body = Block(SIZE, MASS, linvel=(3.0, 4.0, 5.0), angvel=(1.0, 2.0, 0.5))
@@ -129,7 +150,7 @@ def closed_box(half: float = 5.0) -> Scene:
 def tower(count: int = 10, top: float = 1.0) -> Scene:
     """Unit cubes of 1 kg standing on each other on an endless floor.
 
-    The top one has the mass `top` [kg].
+    There are `count` cubes; the top one has the mass `top` [kg].
     """
     masses = [1.0] * (count - 1) + [top]
     bodies = [Block((1.0, 1.0, 1.0), mass, pos=(0.0, k + 0.5, 0.0)) for k, mass in enumerate(masses)]
@@ -137,9 +158,12 @@ def tower(count: int = 10, top: float = 1.0) -> Scene:
 
 
 def heap(count: int = 100, seed: int = 1) -> Scene:
-    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m."""
+    """Unit cubes of 1 kg, turned at random, falling in layers of 5 x 5 into a shaft of 9 m x 9 m.
+
+    There are `count` cubes; `seed` decides their attitudes.
+    """
     rng = np.random.default_rng(seed)
-    pitch = 1.75  # of the grid they start from; the diagonal of a cube is 1.732 m
+    pitch = 1.75  # of the grid of starting positions [m]; the diagonal of a cube is 1.732 m
     bodies = []
     for k in range(count):
         q = rng.standard_normal(4)
@@ -153,7 +177,7 @@ def heap(count: int = 100, seed: int = 1) -> Scene:
 def football() -> Scene:
     """The football of the course notes in flight: kicked at 25 m/s, spinning about its long axis and a little off it.
 
-    Gravity exerts no torque on it; drag and lift are those of the air, and the spin wears off slowly.
+    Gravity exerts no torque on it. The air exerts drag and lift, and slowly brakes the spin.
     """
     launch, spin = 0.6, 50.0  # [rad] above the horizon, [rad/s] about the long axis
     c, s = math.cos(launch), math.sin(launch)
@@ -174,7 +198,7 @@ SCENES = {
 
 
 def _steep_incline() -> Scene:
-    """The block face down on an incline of 20 degrees, on which friction just holds it."""
+    """A block face down on an incline of 20 degrees, on which friction just holds it."""
     angle = math.radians(20.0)
     return incline(angle, 1.01 * math.tan(angle))
 
@@ -183,18 +207,18 @@ SCENES["incline"] = _steep_incline
 
 
 def about(name: str) -> str:
-    """Description of a canonical scene in one line."""
+    """Describe the canonical scene of this name in one line: the first line of its function's docstring."""
     return (SCENES[name].__doc__ or name).splitlines()[0].rstrip(".")
 
 
 def by_name(name: str) -> Scene:
-    """Canonical scene of this name."""
+    """Make the canonical scene of this name, one of `SCENES`; ValueError for other names."""
     if name not in SCENES:
         raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, sorted(SCENES)))}")
     return SCENES[name]()
 
 
-if not TYPE_CHECKING:  # a checker of types would take any name for one that is there
+if not TYPE_CHECKING:  # else a type checker would accept every name as an attribute of the module
 
     def __getattr__(name: str) -> object:
         raise no_attribute("physics.scenes", name, [*SCENES, "SCENES", "about", "block_in_box", "by_name"])

@@ -1,8 +1,8 @@
-"""Effects of a scene: one small frozen dataclass each.
+"""Effects of a scene: a small frozen dataclass for each part of the physics.
 
-A scene declares its effects. Kernels do not contain effects that it does not declare.
+A scene declares its effects. The kernels of a scene contain only the effects that it declares.
 The gyroscopic torque is on automatically where a body's moments of inertia differ.
-Force fields (drag, springs, your own) stand in `physics.scene.force_fields`.
+Force fields (drag, springs and others) are in `physics.scene.force_fields`.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from physics.summary import fields_repr, shown
 @known_keywords
 @dataclass(frozen=True)
 class Gravity(Effect):
-    """A uniform force field: every body accelerates by the same vector, and it exerts no torque.
+    """Uniform gravity: all bodies have the same acceleration, and no torque from it.
 
     Parameters
     ----------
     acceleration : (3,) array_like
-        World frame [m/s²].
+        Acceleration of every body, world frame [m/s²].
     """
 
     acceleration: Vector = (0.0, -9.81, 0.0)
@@ -48,26 +48,27 @@ class Gravity(Effect):
 @known_keywords
 @dataclass(frozen=True)
 class Contact(Effect):
-    """Bodies do not pass through walls, nor through each other.
+    """Contact: bodies do not pass through walls, nor through each other.
 
     Parameters
     ----------
     restitution : float, optional
-        Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times that before. None:
+        Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times the one before it. None:
         impacts are plastic and the kernel holds no restitution. Where bodies have coefficients of their own
-        (`World.set_parameters`), a pair takes the larger one, and a wall the body's.
+        (`World.set_parameters`), two bodies take the larger one; at a wall the body's own acts.
     between_bodies : bool, optional
-        False: bodies meet walls only, and pass through each other.
+        True: bodies touch walls and each other. False: they touch walls only, and pass through each other.
     tangential : float, optional
         Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993). The point of contact leaves an impact
-        with -e_t times its tangential velocity, as far as the cone of `Friction` allows. 1: a superball; 0: it sticks;
-        -1: it slides on. None: like 0, and not compiled.
+        with -e_t times its tangential velocity, as far as the cone of `Friction` allows. 1: a superball; 0: the point
+        sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
     stiffness : float, optional
         k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall [N/m]; greater
-        than 0. It pushes with k times the depth, and bounces without a restitution. None: rigid.
+        than 0. The spring pushes with k times the depth; it makes a body bounce, and `restitution` must be None.
+        None: rigid contact.
     damping : float, optional
-        c of a damper beside the spring [N s/m]; at least 0. The two together never pull (Kelvin and Voigt's model,
-        without adhesion).
+        c of a damper beside the spring [N s/m]; at least 0. Spring and damper together never pull (Kelvin and Voigt's
+        model, without adhesion).
     """
 
     restitution: float | None = None
@@ -115,13 +116,13 @@ class Friction(Effect):
     ----------
     coefficient : float or (2,) array_like
         μ, the same for sticking and sliding; at least 0. Where bodies have coefficients of their own
-        (`World.set_parameters`), a pair takes the geometric mean, and a wall the body's. Two coefficients, greater
-        than 0, are those of walls with a grain: μ1 along `axis` and μ2 across it. Their tangential forces fill the
-        ellipse (f1/μ1)² + (f2/μ2)² <= f_n². Of these the one that dissipates most opposes a slide (Goyal, Ruina and
-        Papadopoulos 1991).
+        (`World.set_parameters`), two bodies take the geometric mean; at a wall the body's own acts. Two coefficients,
+        greater than 0, describe walls with a grain: μ1 acts along `axis` and μ2 across it. The possible friction
+        forces then fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n². A sliding contact has the force of them that
+        dissipates most (Goyal, Ruina and Papadopoulos 1991).
     axis : (3,) or (walls, 3) array_like, optional
-        Direction of μ1, world frame, for all walls or one for each; its part along the wall counts. Needed with two
-        coefficients, and only then.
+        Direction of μ1, world frame: one for all walls, or one for each. Only its component along the wall counts. It
+        must be given with two coefficients, and only then.
     """
 
     coefficient: float | tuple[float, float] = 0.5
@@ -149,21 +150,21 @@ class Friction(Effect):
 
     @property
     def along(self) -> float:
-        """μ, or μ1."""
+        """Coefficient μ; with two coefficients μ1, the one along `axis`."""
         return self.coefficient[0] if isinstance(self.coefficient, tuple) else self.coefficient
 
     @property
     def ratio(self) -> float:
-        """μ2/μ1."""
+        """Ratio μ2/μ1 of the coefficients across and along `axis`; 1 with a single coefficient."""
         return self.coefficient[1] / self.coefficient[0] if isinstance(self.coefficient, tuple) else 1.0
 
     def directions(self, walls: int) -> NDArray[np.float64] | None:
-        """(walls, 3) directions of μ1, world frame; None where it is the same all around."""
+        """Directions of μ1 (walls, 3), one for each of `walls` walls, world frame; None with a single coefficient."""
         return None if self.axis is None else np.broadcast_to(np.array(self.axis), (walls, 3))
 
 
 def _axes(axis: Any) -> tuple:
-    """One direction or a sequence of them, checked."""
+    """Check `Friction.axis`, a vector (3,) or one per wall (walls, 3); return it as a tuple, or a tuple of tuples."""
     try:
         shape = np.shape(axis)
     except ValueError:
@@ -175,7 +176,7 @@ def _axes(axis: Any) -> tuple:
 
 
 class _Resistance(Effect):
-    """A torque of contact, bounded by a length times the normal force."""
+    """Base of rolling and spin friction: a contact torque of at most `radius` [m] times the normal force."""
 
     radius: float
     _repr_html_ = fields_table
@@ -190,12 +191,12 @@ class _Resistance(Effect):
 class RollingFriction(_Resistance):
     """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
 
-    It opposes the part of the angular velocity along the wall, and stops it at most.
+    The torque opposes the component of the angular velocity along the wall; it may stop it, but never reverses it.
 
     Parameters
     ----------
     radius : float
-        Distance of the normal force ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
+        Distance by which the normal force acts ahead of the middle of the contact [m] (Coulomb 1785); at least 0.
     """
 
     radius: float = 0.001
@@ -206,13 +207,14 @@ class RollingFriction(_Resistance):
 class SpinFriction(_Resistance):
     """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
 
-    It opposes the part of the angular velocity along the wall's normal, and stops it at most.
+    The torque opposes the component of the angular velocity along the wall's normal; it may stop it, but never reverses
+    it.
 
     Parameters
     ----------
     radius : float
-        Arm of the friction [m]; at least 0. Of a round patch of radius a under Hertz's pressure 3π/16 μ a (Contensou
-        1962).
+        Arm of the friction [m]; at least 0. A round contact patch of radius a under Hertz's pressure has the arm
+        3π/16 μ a (Contensou 1962).
     """
 
     radius: float = 0.001
@@ -221,14 +223,16 @@ class SpinFriction(_Resistance):
 @known_keywords
 @dataclass(frozen=True)
 class Actuator(Effect):
-    """Actuator between the wrench of `World.step` and the bodies: delay, then limits, then lag, in this order.
+    """Actuator between the wrench given to `World.step` and the bodies: delay, then limits, then lag, in this order.
 
     Parameters
     ----------
     limit_force, limit_torque : float, optional
-        A longer force or torque is shortened to this, its direction kept [N, N m]; more than 0. None: no limit.
+        Largest length of the force [N] and of the torque [N m]; more than 0. A longer one is shortened to it, its
+        direction kept. None: no limit.
     lag : float
-        Time constant τ of the acting wrench w, ``τ dw/dt = command - w`` [s]; at least 0. 0: at once.
+        Time constant τ with which the acting wrench w follows the command, ``τ dw/dt = command - w`` [s]; at least 0.
+        0: the command acts at once.
     delay : float
         Time after which a command arrives [s]; at least 0.
     """
@@ -251,25 +255,26 @@ class Actuator(Effect):
 
     @property
     def remembers(self) -> bool:
-        """True if the acting wrench depends on earlier commands."""
+        """True if the acting wrench depends on commands of earlier steps: with a lag or a delay."""
         return self.lag > 0.0 or self.delay > 0.0
 
 
 @known_keywords
 @dataclass(frozen=True)
 class Sleeping(Effect):
-    """Bodies at rest are left out of the step until something changes that acts on them.
+    """Sleeping: bodies at rest are left out of the step until something changes that acts on them.
 
-    A group of bodies sleeps once every displacement stays below the threshold for two windows of time, and at most
-    doubles from one to the next. A group are bodies that touch, are near to or are tied to each other. A sleeping body
-    keeps its place to the last bit, has no velocity, and costs next to nothing. It wakes when its wrench changes, when
-    an awake body comes near, or when a user changes the world (`World.set_state`, `World.set_parameters`).
+    Bodies that touch, are near each other or are tied together form a group. A group falls asleep once the
+    displacements of its bodies stay below the threshold in two successive windows of time, and at most double from the
+    first to the second. A sleeping body keeps its place to the last bit, has no velocity, and costs next to nothing.
+    It wakes when its wrench changes, when an awake body comes near, or when a user changes the world
+    (`World.set_state`, `World.set_parameters`).
 
     Parameters
     ----------
     slops : float
-        Threshold of the displacement of any point of a body in a window, in units of `Accuracy.slop` times its bounding
-        radius; more than 0.
+        Threshold of the displacement of any point of a body within a window, in units of `Accuracy.slop` times the
+        body's bounding radius; more than 0.
     time : float, optional
         Length of a window [s]; more than 0. None: √(2 r/a), the time in which the body would fall its bounding radius r
         at the acceleration a that it would have without contact. A body without such an acceleration does not sleep.

@@ -1,7 +1,8 @@
-"""Checks of a user's field before a step: its class, its numbers, and all that its functions read.
+"""Checks of a user's force field before a step: its class, its numbers, and everything that its functions read.
 
-A kernel has no exceptions and asks for no bounds. A user's function is compiled alone first, for the types that it
-is called with later, so that nothing is compiled twice; what Numba made of it is then looked through.
+A kernel neither checks the bounds of arrays nor handles exceptions, so a user's function is checked beforehand. It is
+compiled alone, for the types of argument that a step passes, and the result is examined. The step uses the same
+compiled function, so that nothing is compiled twice.
 """
 
 from __future__ import annotations
@@ -19,19 +20,22 @@ from physics.kernels.forces.force_field_state import ZERO, FieldState
 from physics.parallel.bound_call import compiling
 from physics.scene.field_errors import at, not_compiled, placed
 
-# A body at rest in the origin.
+# Example of a first argument of a user's function: a body at rest in the origin.
 _STATE = FieldState(
     ZERO, ZERO, ZERO, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), ZERO, ZERO, 1.0, 0, (1.0, 1.0, 1.0)
 )
 
-# What a function may return, by name.
+# Forms of the value that a user's function returns, as words of a message.
 LOAD = "((fx, fy, fz), (tx, ty, tz)): force [N] and torque about the centre of mass [N m]"
 AIR = "(vx, vy, vz): velocity of the air [m/s]"
 ENERGY = "one number: potential energy [J]"
 
 
 def check_class(kind: type, base: type) -> None:
-    """Refuse a class with values that `columns` would miss: one that lacks the decorator of a dataclass.
+    """Raise a ValueError if the numbers of a field class would not reach its function.
+
+    `Field.columns` collects the fields of a dataclass. A class that declares fields or an ``__init__`` without the
+    decorator of a dataclass is refused, unless it has a `columns` of its own.
 
     Parameters
     ----------
@@ -39,10 +43,6 @@ def check_class(kind: type, base: type) -> None:
         A subclass of `base`.
     base : type
         `physics.Field`.
-
-    Raises
-    ------
-    ValueError
     """
     if kind.columns is not base.columns:
         return
@@ -59,7 +59,7 @@ def check_class(kind: type, base: type) -> None:
 
 
 def numbers_in(effect, name: str) -> np.ndarray:
-    """Field of a dataclass as float64 (n,), all finite; ValueError otherwise."""
+    """Value of the dataclass field `name` of a force field, as float64 (n,); ValueError unless all are finite."""
     value, what = getattr(effect, name), f"{type(effect).__name__}.{name}"
     try:
         return validation.finite(value, np.shape(value), what).ravel()
@@ -68,7 +68,18 @@ def numbers_in(effect, name: str) -> np.ndarray:
 
 
 def numbers_of(effect, body: int, worlds: np.ndarray) -> np.ndarray:
-    """Numbers of `effect.columns(body, worlds)` as float64 (n,) or (k, n), all finite; ValueError otherwise."""
+    """Call `effect.columns(body, worlds)` of a force field and check its result.
+
+    Returns
+    -------
+    (n,) or (k, n) float64
+        The field's n numbers for this body: the same for all worlds, or a row for each of the k `worlds`.
+
+    Raises
+    ------
+    ValueError
+        The result is not an array of finite numbers in one of these shapes.
+    """
     name, found = f"{type(effect).__name__}.columns", effect.columns(body, worlds)
     try:
         numbers = np.asarray(found, dtype=np.float64)
@@ -80,24 +91,25 @@ def numbers_of(effect, body: int, worlds: np.ndarray) -> np.ndarray:
 
 
 def check_function(name: str, function: Callable, form: str, size: int, numbers: str) -> bool:
-    """Check a user's function for the types of its arguments; return whether a call may raise an exception.
+    """Check a user's function ``(state, p, t)``; return whether a call of it may raise an exception.
 
     Parameters
     ----------
     name : str
-        ``Class.function``.
+        Name of the function for messages, ``Class.function``.
     function : kernel
+        The function, made by `physics.field_function`.
     form : str
-        `LOAD`, `AIR` or `ENERGY`.
+        Form of the value that it must return: `LOAD`, `AIR` or `ENERGY`.
     size : int
-        Length of p.
+        Length of its argument p, the numbers of the field.
     numbers : str
-        The numbers in p, for messages.
+        Description of the numbers in p, for messages.
 
     Raises
     ------
     ValueError
-        It takes other arguments, cannot be compiled, returns something else, or reads what p does not have.
+        The function takes other arguments, cannot be compiled, returns another form, or reads beyond the end of p.
     """
     arguments = _STATE, np.zeros(size), 0.0
     taken = inspect.signature(plain_function(function))
@@ -127,7 +139,10 @@ def _fits(returned: str | tuple, form: str) -> bool:
 
 
 def describe(kind: type, base: type, size: int) -> str:
-    """Describe the columns of p in words."""
+    """Describe, for messages, the `size` numbers that the functions of a field class `kind` get as p.
+
+    `base` is `physics.Field`.
+    """
     if kind.columns is base.columns:
         names = ", ".join(each.name for each in fields(kind))
         return f"the fields of {kind.__name__}, {names}" if names else f"{kind.__name__} has no fields"

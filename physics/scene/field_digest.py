@@ -1,4 +1,4 @@
-"""Digest that identifies a version of a user's function, and its compiled form of that version."""
+"""Digests of users' functions, which change with the code, and functions compiled for the current digest."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from physics.compiler.decorators import backend, is_compiled, plain_function, us
 def digest(*functions: Callable | None) -> str:
     """Hexadecimal digest of everything that decides the machine code of these functions.
 
-    The digest covers their code, and the numbers and functions that they read from around them, recursively. Of other
-    modules that they name it covers the source.
+    It covers the bytecode of the functions, and recursively the globals and closure variables (numbers, arrays,
+    functions) that they read. For a module that they name it covers the whole source file.
     """
     found = hashlib.sha256()
     seen: set[int] = set()
@@ -27,7 +27,10 @@ def digest(*functions: Callable | None) -> str:
 
 
 def _feed(found, value, seen: set[int]) -> None:
-    """Add a value that a function reads to a digest."""
+    """Add to the digest `found` a value that a function reads, recursively.
+
+    `seen` holds the ids of the functions that the digest covers already.
+    """
     value = plain_function(value)
     if isinstance(value, types.FunctionType):
         if id(value) not in seen:
@@ -66,7 +69,10 @@ def _feed_function(found, function: types.FunctionType, seen: set[int]) -> None:
 
 
 def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
-    """A compiled function and all functions that it names, recursively; functions of modules are left out."""
+    """Iterate over a kernel and all kernels among its globals and closure variables, recursively.
+
+    Kernels that it reaches as attributes of a module are left out. `seen` holds those that were yielded already.
+    """
     seen = set() if seen is None else seen
     if function in seen:
         return
@@ -79,9 +85,10 @@ def called(function: Callable, seen: set | None = None) -> Iterator[Callable]:
 
 
 def as_it_is(function: Callable) -> Callable:
-    """Function without machine code from before an edit of the globals that it reads.
+    """Compile a user's function for the current values of the globals that it reads; return the kernel.
 
-    Numba reads the numbers and functions around a function when it compiles it, and never again.
+    Numba reads globals only when it compiles. So kernels that read a global which has changed since are discarded and
+    compiled again.
     """
     key = plain_function(function), digest(function)
     if key not in _AS_IT_IS:

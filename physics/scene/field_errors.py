@@ -1,4 +1,4 @@
-"""Errors of a field's functions in the words of its user: the class, the function, the line, and what is allowed."""
+"""Errors of the functions of a user's force field: messages name the class, the function, the line, and what to do."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ ALLOWED = (
     "arrays, lists and other objects cannot be made"
 )
 
-# Numba names the place of each statement that it had to do with as "at FILE (LINE)", the innermost first.
+# Numba's messages name the place of each statement concerned as "at FILE (LINE)", the innermost first.
 _PLACE = re.compile(r"\b(?:at|from) (\S.*?) \((\d+)\)")
 
-# What Numba says of the statement, and what its user has to know. `%` takes the groups found.
+# Patterns of Numba's messages, and the words in which a user reads each. `%s` and `%r` take the groups of the match.
 _KNOWN = (
     (r"Unknown attribute '(\w+)' of type FieldState", "state has no %r; allowed are " + ", ".join(FieldState._fields)),
     (r"'FieldState' object has no attribute '(\w+)'", "state has no %r; allowed are " + ", ".join(FieldState._fields)),
@@ -49,7 +49,7 @@ _KNOWN = (
 
 
 class Place(NamedTuple):
-    """Line of a user's file, and its function."""
+    """Line of a user's file, and the name of the function that it is in; its `str` is like a line of a traceback."""
 
     file: str
     line: int
@@ -62,26 +62,27 @@ class Place(NamedTuple):
 
 
 def at(function: Callable, line: tuple[str, int] | None = None) -> Place:
-    """Place of a statement of a function, by file and line; without them that of its first line."""
+    """Place of a statement of a function, given by file and line; by default the first line of the function."""
     plain = plain_function(function)
     return Place(*(line or (plain.__code__.co_filename, plain.__code__.co_firstlineno)), plain.__name__)
 
 
 def placed(what: str, place: Place) -> str:
-    """Add a place to a message."""
+    """Append a place in a user's file to the message `what`, on lines of its own."""
     return f"{what}\n{place}"
 
 
 def not_compiled(name: str, function: Callable, error: Exception) -> ValueError:
-    """Return the error of a function that Numba cannot compile.
+    """Make the error for a user's function that Numba cannot compile; its message names the statement.
 
     Parameters
     ----------
     name : str
-        ``Class.function``.
+        Name of the function for the message, ``Class.function``.
     function : kernel
+        The function itself.
     error : Exception
-        Numba's.
+        Exception that Numba raised.
     """
     return ValueError(placed(f"{name} cannot be compiled: {_reason(str(error))}", _place(function, error)))
 
@@ -117,14 +118,19 @@ def _holds(function: Callable, file: str, line: int) -> bool:
 
 
 def raised(error: Exception, slots: tuple) -> Exception:
-    """Make the error of an exception in a compiled function, with its field's class; only an IndexError is reworded.
+    """Reword an IndexError that a user's compiled function raised in a step; return other exceptions unchanged.
 
     Parameters
     ----------
     error : Exception
-        Its traceback ends in the user's function.
+        Exception whose traceback ends in the user's function.
     slots : tuple of physics.scene.force_field.FieldSlot
-        The fields of the scene.
+        The fields of the scene, among which the function is searched.
+
+    Returns
+    -------
+    Exception
+        IndexError that names the class of the field and the line, with `error` as its cause.
     """
     if not isinstance(error, IndexError):
         return error

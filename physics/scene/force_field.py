@@ -1,7 +1,8 @@
-"""Base class of force fields, and the compilation of a user's own ones.
+"""Base class of force fields, and the compilation of a user's own fields.
 
-A field is a frozen dataclass with a compiled function: force and torque on a body from its state, the field's
-parameters and the time. The built-in ones stand in `physics.scene.force_fields`; your own needs nothing beyond these::
+A field is a frozen dataclass with a compiled function, which computes force and torque on a body from its state, the
+field's parameters and the time. The built-in fields are in `physics.scene.force_fields`. This is a whole field of a
+user's own::
 
     @physics.field_function
     def pull(state, p, t):
@@ -39,25 +40,27 @@ field_function = user_kernel
 class Field(Effect):
     """A force field: force and torque on every body from its state and the time. Subclass it to make one.
 
-    A subclass is a frozen dataclass, or gives its numbers by `columns`; one that does neither is a ValueError when an
-    object of it is made. Its functions are checked when a `World` is: see `physics.scene.field_check`.
+    A subclass is a frozen dataclass, or overrides `columns`. A subclass with fields that does neither raises a
+    ValueError when an object of it is made. Its functions are checked when a `World` is made: see
+    `physics.scene.field_check`.
 
     Attributes
     ----------
     function : compiled function, of the class
         ``(state, p, t) -> (force, torque)`` with a `physics.kernels.forces.force_field_state.FieldState`, the numbers
         of `columns` and the time [s]; force [N] and torque about the centre of mass [N m] are tuples of three, world
-        frame. Made by `physics.field_function`; it may call others that are.
+        frame. It is made by `physics.field_function`, and may call other functions made so.
     energy : compiled function or None, of the class
-        ``(state, p, t) -> potential energy`` [J], of a field that has one: for `physics.diagnose`.
+        ``(state, p, t) -> potential energy`` [J], which `physics.diagnose` reports. None: the field has no potential.
     has_many : bool, of the class
-        Whether a scene may hold several.
+        Whether a scene may hold several fields of this class.
     is_air : bool, of the class
         Whether `function` gives the velocity of the air (a tuple of three) instead of a load.
     is_linked : bool, of the class
-        Whether `function` depends on another body, too; only the built-in `Spring` between bodies knows how.
+        Whether `function` depends on another body, too. Only the built-in `Spring` between two bodies supports it.
     needs_axes : bool, of the class
-        Whether `function` makes something of the shape and the half axes in the state: a hull has none.
+        Whether `function` reads the shape and the half axes in the state. A hull has no half axes, so that a scene
+        with hulls refuses such a field.
     """
 
     function: ClassVar[Any] = None
@@ -78,55 +81,61 @@ class Field(Effect):
 
     @property
     def kind(self) -> type[Field]:
-        """Class whose functions are compiled for the field: its own."""
+        """Class whose functions are compiled for this field; by default the field's own class."""
         return type(self)
 
     def columns(self, body: int, worlds: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Numbers for `function`, for one body of the scene.
+        """Numbers that `function` gets as p, for one body of the scene.
 
         Parameters
         ----------
         body : int
+            Index of the body in the scene.
         worlds : (k,) int64
+            Indices of the worlds of a batch.
 
         Returns
         -------
         (n,) or (k, n) float64
-            By default the dataclass's own fields, one after the other; the same n for every body and world.
+            The n numbers for all worlds alike, or a row for each of `worlds`; n is the same for every body. By default
+            the values of the dataclass's fields, one after the other.
 
         Raises
         ------
         ValueError
-            A field of the dataclass is no finite number, nor an array of them.
+            A field of the dataclass is neither a finite number nor an array of finite numbers.
         """
         numbers = [field_check.numbers_in(self, field.name) for field in fields(self)]
         return np.concatenate(numbers) if numbers else np.empty(0)
 
     def check(self, body_count: int) -> None:
-        """Raise a ValueError if the field does not fit a scene of so many bodies."""
+        """Raise a ValueError if the field does not fit a scene of `body_count` bodies; by default every scene fits."""
 
     @property
     def takes_energy(self) -> bool | None:
-        """True if the field only removes mechanical energy, False if it conserves it with its own, else None."""
+        """Effect of the field on energy: True if it only removes energy, False if it conserves it, None if unknown.
+
+        The energy is the mechanical energy of the bodies plus the potential energy of the field.
+        """
         return None
 
     @property
     def is_steady(self) -> bool:
-        """True if the field's effect on a resting body is constant in time; unknown for a user's own fields.
+        """True if the field's effect on a resting body is constant in time; False by default, as for users' fields.
 
-        `Sleeping` needs this: under a load that may change on its own nothing sleeps.
+        No body of a scene sleeps (`Sleeping`) if one of its fields is not steady.
         """
         return False
 
     @property
     def label(self) -> str:
-        """Name in a plan: the class in words."""
+        """Name of the field in the explanation of a plan: its class in lower-case words, as "angular drag"."""
         name = type(self).__name__
         return "".join(f" {c.lower()}" if c.isupper() and k else c.lower() for k, c in enumerate(name))
 
 
 class Checked(Field):
-    """Built-in field, which sets checked values on a frozen dataclass."""
+    """Base of the built-in fields: steady by default, with a method that checks and sets values when one is made."""
 
     @property
     def is_steady(self) -> bool:
@@ -139,19 +148,22 @@ class Checked(Field):
 
 @dataclass(frozen=True)
 class FieldSlot:
-    """A kind of field in a scene: its term in the kernel, and the scene's effects of that kind.
+    """All fields of one kind in a scene: their common term in the kernel, and their columns of numbers.
 
     Attributes
     ----------
     kind : type
+        Class of the fields, `Field.kind`.
     term : Term
+        Description of the kind for the compiler: its functions and the count of its numbers.
     first : int
-        Its first column among the fields' [1].
+        Index of the first column of these fields in the table of all fields' numbers.
     effects : tuple of Field
+        The scene's fields of this kind.
     is_users : bool
-        Whether it is none of the built-in ones.
+        Whether the kind is a user's own, not a built-in one.
     may_raise : bool
-        Whether a step in which its function is called may end in an exception.
+        Whether a step may raise an exception in the kind's function.
     """
 
     kind: type[Field]
@@ -163,13 +175,15 @@ class FieldSlot:
 
 
 def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...]:
-    """Fields among a scene's effects, by kind; the order of declaration does not matter.
+    """Group the fields among a scene's effects by kind, with one slot for each kind.
+
+    The order of the slots does not depend on the order in which the scene declares its fields.
 
     Raises
     ------
     ValueError
-        A field without a compiled function, or with another number of columns for another body or effect; a user's
-        function that does not fit (`physics.scene.field_check.check_function`).
+        A field has no compiled function, or its `columns` gives different counts of numbers for different bodies or
+        effects; or a user's function fails `physics.scene.field_check.check_function`.
     """
     kinds: dict[type[Field], list[Field]] = {}
     for effect in effects:
@@ -200,7 +214,7 @@ def _column_count(kind: type[Field], found: list[Field], body_count: int) -> int
 
 
 def _check_functions(kind: type[Field], term: Term) -> bool:
-    """Check a user's functions; return whether the function of a step may raise an exception."""
+    """Check `energy` and `function` of a user's field class; return whether `function` may raise an exception."""
     numbers = field_check.describe(kind, Field, term.size)
     form = field_check.AIR if kind.is_air else field_check.LOAD
     if term.energy is not None:
@@ -220,7 +234,7 @@ def _compiled(kind: type[Field], name: str) -> Any:
 
 
 def _name(kind: type[Field]) -> str:
-    """Name that identifies this kind of field: its function's, with a digest for a user's own."""
+    """Name that identifies a kind of field: that of its function; for a user's field with the functions' digest."""
     function = _compiled(kind, "function")
     name = plain_function(function).__name__.replace("_", "")
     if _is_built_in(function):
@@ -229,21 +243,23 @@ def _name(kind: type[Field]) -> str:
 
 
 def write_columns(slots: Sequence[FieldSlot], params: np.ndarray, body_count: int, worlds: np.ndarray) -> None:
-    """Write the parameters of all fields into their columns.
+    """Write the numbers of all fields of a scene into the columns of a parameter table.
 
     Parameters
     ----------
     slots : tuple of FieldSlot
-    params : (len(worlds) * body_count, n) float64, out
-        The columns of fields alone.
+        The fields of the scene.
+    params : (k * body_count, n) float64, out
+        Columns of the fields only, with a row for each body of each of the k worlds.
     body_count : int
+        Bodies of the scene.
     worlds : (k,) int64
-        Which worlds these rows are.
+        Indices of the worlds that the rows belong to.
 
     Raises
     ------
     ValueError
-        A parameter that is not finite, or others in number than in the scene.
+        A number is not finite, or a field gives another count of numbers than when the scene was planned.
     """
     for slot in slots:
         size = slot.term.size

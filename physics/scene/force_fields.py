@@ -1,4 +1,4 @@
-"""Built-in force fields: one small frozen dataclass per effect. Sources and formulas stand with their functions."""
+"""Built-in force fields: a small frozen dataclass for each. Formulas and sources are in `physics.kernels.forces`."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ WATER_DENSITY = 1000.0  # [kg/m³]
 class Drag(Checked):
     """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
 
-    u is the velocity of the body's geometric centre relative to the air (`Wind`), where the force acts.
+    u is the velocity of the body's geometric centre relative to the air (`Wind`). The force acts at that centre.
 
     Parameters
     ----------
     coefficient : float
-        C of the quadratic law, on the shadow's area; at least 0. 0.47: a sphere at Reynolds numbers of 10⁴ to 10⁵
-        (Hoerner, *Fluid-Dynamic Drag*, 1965).
+        C of the quadratic law, for the area of the shadow; at least 0. A sphere at Reynolds numbers of 10⁴ to 10⁵ has
+        0.47 (Hoerner, *Fluid-Dynamic Drag*, 1965).
     density : float
-        ρ [kg/m³].
+        ρ of the air or water [kg/m³].
     linear : float
-        c [N s/m], whatever the shape.
+        c of the linear law [N s/m], the same for all shapes.
     """
 
     coefficient: float = 0.47
@@ -66,9 +66,9 @@ class AngularDrag(Checked):
     Parameters
     ----------
     linear : float
-        c [N m s].
+        c of the linear law [N m s].
     quadratic : float
-        d [N m s²].
+        d of the quadratic law [N m s²].
     """
 
     linear: float = 0.01
@@ -93,14 +93,16 @@ class AngularDrag(Checked):
 @known_keywords
 @dataclass(frozen=True)
 class Magnus(Checked):
-    """Lift of every body that spins: ``F = ½ ρ C π r³ ω x u``, r the radius of the sphere of the same volume.
+    """Magnus lift of every body that spins: ``F = ½ ρ C π r³ ω x u``, r the radius of the sphere of the same volume.
+
+    u is the velocity relative to the air, ω the angular velocity.
 
     Parameters
     ----------
     coefficient : float
         C; at least 0. About 1 for sports balls (Nathan, Am. J. Phys. 76, 2008), 2 in a very viscous fluid.
     density : float
-        ρ [kg/m³].
+        ρ of the air [kg/m³].
     """
 
     coefficient: float = 1.0
@@ -131,13 +133,13 @@ class Wind(Checked):
     Parameters
     ----------
     velocity : (3,) array_like
-        Mean, world frame [m/s].
+        Mean velocity, world frame [m/s].
     gust : float
-        Standard deviation of each component [m/s].
+        Standard deviation of each component of the velocity [m/s]; 0: no gusts.
     time_scale : float
-        Over which gusts are correlated [s].
+        Correlation time of the gusts [s].
     seed : int
-        Of the gusts; each world of a batch has its own.
+        Seed of the gusts. The worlds of a batch have different gusts.
     """
 
     velocity: Vector = (5.0, 0.0, 0.0)
@@ -180,16 +182,18 @@ class Wind(Checked):
 @known_keywords
 @dataclass(frozen=True)
 class Buoyancy(Checked):
-    """Lift of a fluid at rest that fills a half-space: its weight where the body is, at the centre of that part.
+    """Lift of a fluid at rest that fills a half-space: the weight of the fluid displaced by a body.
+
+    The force acts at the centre of the submerged part of the body.
 
     Parameters
     ----------
     density : float
-        Of the fluid [kg/m³]; at least 0.
+        Density of the fluid [kg/m³]; at least 0.
     normal : (3,) array_like
-        Of the surface, upwards; any length but zero, it is normalised.
+        Upward normal of the surface, world frame; any vector but zero, it is normalised.
     offset : float
-        The fluid is where normal·x <= offset [m].
+        Place of the surface: the fluid is where normal·x <= offset [m].
     gravity : float
         Strength of gravity in the fluid [m/s²].
     """

@@ -1,4 +1,4 @@
-"""Needs of a scene: the effects that can act in it."""
+"""Needs of a scene: the effects that can act in it. Scheme and compiled kernels depend on them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, S
 from physics.scene.force_field import Field, FieldSlot, field_slots
 from physics.scene.scene import Scene
 
-# Moments that differ by less than this share are equal to rounding: the gyroscopic torque would be noise.
+# Moments of inertia that differ by less than this share are equal to rounding; their gyroscopic torque would be noise.
 ISOTROPY_TOLERANCE = 1e-14
 
 
@@ -33,24 +33,31 @@ class Needs:
     Attributes
     ----------
     contact, friction, gravity : Contact, Friction, Gravity or None
-        As declared.
-    touching, meeting, rubbing : bool
-        Anything can touch; bodies can touch each other; friction can act.
+        Effects as the scene declares them.
+    touching : bool
+        Whether bodies can touch anything, a wall or another body.
+    meeting : bool
+        Whether bodies can touch each other.
+    rubbing : bool
+        Whether friction can act.
     linked : bool
-        Springs tie bodies together.
+        Whether springs tie bodies together.
     kinds : frozenset of str
-        Kinds of the bodies.
+        Shapes of the bodies, such as ``block``.
     features : int
-        Features of a body that may touch a wall.
-    isotropic, turned : bool
-        All moments of every body are equal; else principal axes of some are not their body axes.
+        Features with which a body may touch a wall: the 8 vertices of a block if the scene has blocks, else 1.
+    isotropic : bool
+        Whether every body has three equal moments of inertia.
+    turned : bool
+        Whether some body's principal axes are not its body axes; False if `isotropic`.
     uneven : list of int
-        Bodies whose centre of mass is not their geometric centre.
+        Indices of bodies whose centre of mass is not their geometric centre.
     sleeping : bool
-        Bodies may sleep.
+        Whether bodies may sleep.
     fields : tuple of FieldSlot
+        Force fields of the scene.
     laws : tuple of str
-        Those of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls.
+        Contact laws at walls beyond rigid contact, names from `physics.kernels.state.contact_law_dispatch.LAWS`.
     """
 
     contact: Any
@@ -71,22 +78,22 @@ class Needs:
 
     @property
     def ellipsoids(self) -> bool:
-        """True if ellipsoids are among bodies that touch each other."""
+        """True if bodies can touch each other and ellipsoids are among them."""
         return self.meeting and "ellipsoid" in self.kinds
 
     @property
     def hulls(self) -> bool:
-        """True if hulls may touch anything."""
+        """True if hulls can touch walls or other bodies."""
         return self.touching and "hull" in self.kinds
 
 
 def is_isotropic(moments: np.ndarray) -> Any:
-    """True if all `moments` (..., 3) are equal to rounding: then ω stays constant in free flight."""
+    """True (...) where the three `moments` (..., 3) of a body are equal to rounding: it needs no gyroscopic torque."""
     return np.ptp(moments, axis=-1) <= ISOTROPY_TOLERANCE * np.max(moments, axis=-1)
 
 
 def is_tilted(R: np.ndarray) -> Any:
-    """True if the principal axes `R` (..., 3, 3) are not the body axes."""
+    """True (...) where the rotation `R` (..., 3, 3) from principal to body axes is not the identity."""
     return (R - np.eye(3)).any(axis=(-2, -1))
 
 
@@ -116,7 +123,7 @@ def find_needs(scene: Scene) -> Needs:
 
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
-    """The laws of `physics.kernels.state.contact_law_dispatch` that act where bodies touch walls."""
+    """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
     has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,

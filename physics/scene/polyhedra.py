@@ -7,7 +7,10 @@ from physics.scene.bodies import Body
 
 
 def polyhedra(bodies: tuple[Body, ...]) -> list:
-    """Polyhedra of bodies for `hull_tables.make_hulls`; empty where none is a hull."""
+    """Polyhedron of each body for `hull_tables.make_hulls`; an empty list if no body is a hull.
+
+    A hull has its own polyhedron, a block the unit cube, and a round body None.
+    """
     if not any(body.kind == "hull" for body in bodies):
         return []
     blocks = {"block": CUBE}

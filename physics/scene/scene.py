@@ -1,4 +1,4 @@
-"""A scene: bodies, walls and effects. Immutable and validated; no numerics."""
+"""A scene: an immutable, checked description of bodies, walls and effects, without numerics."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleep
 from physics.scene.force_field import Field
 from physics.summary import SCREEN, counted, parts_repr, shown
 
-# An axis of friction and the normal of a wall count as parallel below this sine of the angle between them [rad]: of the
-# sixteen digits of a direction ten are left for its part along the wall.
+# An axis of friction and the normal of a wall count as parallel if the sine of the angle between them is below this.
+# Of the sixteen digits of a direction ten are then left for its component along the wall.
 LEAST_SINE = 1e-6
 
-# A `repr` shows every body, wall and effect of a scene with at most so many of them, if they fit on a screen.
+# A `repr` shows every body, wall and effect of a scene that has at most so many of them together and fits on a screen.
 MOST_SHOWN = 12
 
 NO_CONTACT = (
@@ -37,20 +37,20 @@ EffectType = TypeVar("EffectType")
 
 
 class SceneWarning(UserWarning):
-    """Warning about a valid scene in which a declaration has no effect."""
+    """Warning about a scene that is valid, but in which something has no effect, such as walls without `Contact`."""
 
 
 @known_keywords
 @dataclass(frozen=True)
 class HalfSpace:
-    """Half-space {x : normal·x >= offset} that bodies may be in.
+    """Plane wall: bodies stay in the half-space {x : normal·x >= offset}.
 
     Parameters
     ----------
     normal : (3,) array_like
-        Out of the wall, into the free side; any length but zero, it is normalised.
+        Normal out of the wall, towards the bodies, world frame; any vector but zero, it is normalised.
     offset : float
-        Of the normalised plane [m].
+        Distance of the plane from the origin along the unit normal [m].
     """
 
     normal: Vector
@@ -73,30 +73,31 @@ class HalfSpace:
 
 @known_keywords
 def three_walls(half_width: float = 10.0) -> list[HalfSpace]:
-    """The three-wall box: the floor y = 0 between walls at x = ±half_width [m], open to front, back and top."""
+    """Walls of the three-wall box: the floor y = 0 and walls at x = ±half_width [m], open to front, back and top."""
     half_width = float(validation.positive(half_width, (), "half_width"))
     return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), -half_width), HalfSpace((-1, 0, 0), -half_width)]
 
 
 def corner() -> list[HalfSpace]:
-    """The corner: the floor y = 0 and the walls x = 0 and z = 0."""
+    """Walls of a corner: the floor y = 0 and the walls x = 0 and z = 0, with bodies at positive x, y and z."""
     return [HalfSpace((0, 1, 0), 0.0), HalfSpace((1, 0, 0), 0.0), HalfSpace((0, 0, 1), 0.0)]
 
 
 @known_keywords
 @dataclass(frozen=True)
 class Scene:
-    """Bodies, walls and effects.
+    """Immutable description of what is simulated: bodies, walls and effects.
 
     Parameters
     ----------
     bodies : sequence of Body
-        At least one; those with names have different ones.
+        At least one body. No two bodies may have the same name.
     walls : sequence of HalfSpace
+        Walls, possibly none.
     effects : sequence of effects
         At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction`,
-        `SpinFriction` and `Sleeping` need `Contact`, `Contact.tangential` needs `Friction`, `Wind` needs a field for it
-        to act through.
+        `SpinFriction` and `Sleeping` need `Contact`. `Contact.tangential` needs `Friction`. `Wind` needs a field
+        through which it acts, such as `Drag`.
 
     Warns
     -----
@@ -106,7 +107,7 @@ class Scene:
     Raises
     ------
     ValueError
-        Naming what is wrong; also when a body starts deep inside a wall (checked by `World`).
+        An argument is invalid; the message names it. `World` also refuses a body that starts deep inside a wall.
     """
 
     bodies: tuple[Body, ...]
@@ -158,7 +159,7 @@ class Scene:
         )
 
     def _expression(self) -> str:
-        """Expression that makes the scene again; none if it would fill a screen."""
+        """Python expression that makes the scene again; "" if it would not fit on a screen."""
         if len(self.bodies) + len(self.walls) + len(self.effects) > MOST_SHOWN:
             return ""
         text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
@@ -211,13 +212,13 @@ class Scene:
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
 
     def effect(self, kind: type[EffectType]) -> EffectType | None:
-        """The scene's effect of this class, or None."""
+        """The scene's first effect of this class; None if it has none."""
         validation.instance(kind, type, "kind", "the class of an effect, as physics.Gravity")
         return next((effect for effect in self.effects if isinstance(effect, kind)), None)
 
 
 def _items(given: Any, name: str, allowed: Any) -> tuple:
-    """The bodies, walls or effects of a scene, as a tuple."""
+    """Check the argument `name` of `Scene`, one object or several, all of the `allowed` classes; return a tuple."""
     if isinstance(given, allowed):
         return (given,)
     if isinstance(given, (str, bytes, dict)) or not isinstance(given, Iterable):
@@ -232,7 +233,7 @@ def _items(given: Any, name: str, allowed: Any) -> tuple:
 
 
 def _frames_of_package() -> int:
-    """`stacklevel` of a warning that names the line outside this package that led here."""
+    """`stacklevel` with which a warning of the caller names the line outside this package that called into it."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):
         level, frame = level + 1, frame.f_back

@@ -1,4 +1,7 @@
-"""Springs and pushes: fields that act at a point of one body, or between two. Formulas stand with their functions."""
+"""Springs and pushes: force fields that act at a point of one body, or between two bodies.
+
+Formulas and sources are in `physics.kernels.forces`.
+"""
 
 from __future__ import annotations
 
@@ -24,24 +27,26 @@ def _check_body(effect: Any, body_count: int, name: str) -> None:
 @known_keywords
 @dataclass(frozen=True)
 class Spring(Checked):
-    """Spring and damper from a point of a body to an anchor: ``-(k (l - l0) + c dl/dt)`` along the line. Any number.
+    """Spring and damper from a point of a body to an anchor: force ``-(k (l - l0) + c dl/dt)`` along their line.
+
+    A scene may hold any number of springs.
 
     Parameters
     ----------
     anchor : (3,) array_like
-        World frame [m]; with `other` a point of that body: its body frame, from its centre of mass.
+        Fixed anchor, world frame [m]. With `other` it is a point of that body: body frame, from its centre of mass.
     point : (3,) array_like
-        Where it is fixed to the body: body frame, from the centre of mass [m].
+        Point of the body to which the spring is fixed: body frame, from the centre of mass [m].
     stiffness : float
-        k [N/m].
+        Stiffness k [N/m].
     damping : float
-        c [N s/m].
+        Damping constant c [N s/m].
     length : float
-        l0, without force [m].
+        Rest length l0 [m].
     body : int
-        Index in `Scene.bodies`.
+        Index of the body in `Scene.bodies`.
     other : int or None
-        Index of another body that holds the anchor, and is pulled by the opposite force. None: the anchor is fixed.
+        Index of another body that holds the anchor and gets the opposite force. None: the anchor is fixed in the world.
     """
 
     anchor: Vector = (0.0, 0.0, 0.0)
@@ -103,7 +108,7 @@ class Spring(Checked):
         return np.array([*self.point, *self.anchor, self.length, acts * self.stiffness, acts * self.damping])
 
     def _linked_columns(self, body: int) -> NDArray[np.float64]:
-        """Columns of one end of a spring between bodies, or of a body that is at neither end."""
+        """Numbers (`LINK_SIZE`,) of this two-body spring for one of its two bodies, or for a body at neither end."""
         ends = {self.body: (self.point, self.other, self.anchor), self.other: (self.anchor, self.body, self.point)}
         here, other, there = ends.get(body, ((0.0, 0.0, 0.0), -1, (0.0, 0.0, 0.0)))
         columns = np.zeros(implicit_two_body_spring.LINK_SIZE)
@@ -115,7 +120,7 @@ class Spring(Checked):
 
 
 class _LinkedSpring(Spring):
-    """Field that is compiled for springs between bodies."""
+    """Class with the functions that are compiled for springs between two bodies; users make a `Spring` with `other`."""
 
     function: ClassVar[Any] = two_body_spring.linked_spring
     energy: ClassVar[Any] = two_body_spring.linked_spring_energy
@@ -128,18 +133,18 @@ class _LinkedSpring(Spring):
 @known_keywords
 @dataclass(frozen=True)
 class Push(Checked):
-    """A constant force at a point of a body. Any number.
+    """Constant force at a point of a body. A scene may hold any number of pushes.
 
     Parameters
     ----------
     force : (3,) array_like
-        [N].
+        Force [N], in the frame that `frame` names.
     point : (3,) array_like
-        Where it acts: body frame, from the centre of mass [m].
+        Point at which the force acts: body frame, from the centre of mass [m].
     frame : {"world", "body"}
-        Of `force`; ``body``: it turns with the body, as the thrust of a rocket does.
+        Frame of `force`. In the body frame the force turns with the body, like the thrust of a rocket.
     body : int
-        Index in `Scene.bodies`.
+        Index of the body in `Scene.bodies`.
     """
 
     force: Vector = (0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Schemes of a step, one module each; `physics.schemes.scheme` says how to add one."""
+"""Schemes that step a world, one module for each; `physics.schemes.scheme` explains how to add one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MODULES = (
     "events",
     "walls",
 )
-"""Modules of schemes, a line each. The first scheme that takes a scene steps it."""
+"""Names of the modules with schemes, in order of preference: the first scheme that takes a scene steps it."""
 
 SCHEMES: tuple[Scheme, ...] = tuple(
     scheme for name in MODULES for scheme in import_module(f"physics.schemes.{name}").SCHEMES
@@ -28,7 +28,7 @@ def scheme_for(scene: Scene, needs: Needs, accuracy: Accuracy) -> Scheme:
     Raises
     ------
     ValueError
-        There is none, or the scene declares something that it does not know.
+        No scheme takes the scene, or the scene declares an effect that its scheme does not support.
     """
     for scheme in SCHEMES:
         if scheme.takes(needs, accuracy):

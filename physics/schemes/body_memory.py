@@ -1,4 +1,7 @@
-"""Contact memory of bodies that touch each other, a row for each world: `multibody.data.warm_start` of the kernels."""
+"""Contact memory of bodies that touch each other, a row for each world.
+
+The kernels write it in `physics.kernels.multibody.data.warm_start`.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +20,17 @@ from physics.schemes.contacts import EVERY_BODY, Contacts, Strongest, keep_stron
 
 @kernel
 def _ends(i, k, memory):
-    """First column of contact k of world i, and the bodies that it is of."""
+    """First column of contact `k` of world `i`, its first body, and its second body or -1 - wall."""
     row = many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * k
     return row, int(memory[i, row + many.WARM_BODY_A]), int(memory[i, row + many.WARM_BODY_B])
 
 
 @kernel
 def _choose(world, body, memory, strongest):
-    """Choose the contacts of one world that are shown: how many, of how many."""
+    """Choose the strongest contacts of a world, or of a `body` in it; return how many were chosen, and of how many.
+
+    The chosen contacts are written into `strongest`.
+    """
     kept, count, length = 0, 0, memory[world, many.WARM_STAGE_LENGTH]
     for k in range(int(memory[world, many.WARM_CONTACT_COUNT])):
         row, a, b = _ends(world, k, memory)
@@ -38,7 +44,10 @@ def _choose(world, body, memory, strongest):
 
 @kernel
 def _read(indices, body, memory, strongest, out):
-    """Contacts of some worlds; a chosen body comes first in its contacts."""
+    """Read the contacts of the worlds `indices` into `out`.
+
+    With a `body` other than `EVERY_BODY` only its contacts are read, with it as their first body.
+    """
     for n in range(indices.shape[0]):
         world = indices[n]
         kept, out.count[n] = _choose(world, body, memory, strongest)
@@ -71,17 +80,18 @@ def _add_forces(indices, memory, out):
 
 
 def contact_capacity(memory: np.ndarray) -> int:
-    """Contacts that a row has room for."""
+    """Number of contacts for which a row of this memory has room."""
     return (memory.shape[1] - many.WARM_HEADER_SIZE) // many.WARM_CONTACT_SIZE
 
 
 class BodyMemory(ContactMemory):
-    """Contacts of bodies with each other and with walls, a row for each world.
+    """Memory of the contacts of bodies with each other and with walls, a row for each world.
 
     Parameters
     ----------
     keeps_part : bool
-        The last column is the length of a part of a substep, which error control begins with.
+        Whether the last column keeps the length of a part of a substep, with which error control begins the next
+        substep.
     """
 
     def __init__(self, keeps_part: bool = False):

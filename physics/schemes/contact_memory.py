@@ -1,4 +1,4 @@
-"""Contact memory of a scheme: contacts of the last stage, which start the next solve and which users are shown."""
+"""Contact memory of a scheme: contacts of the last stage, with which the next solve starts and which users read."""
 
 from __future__ import annotations
 
@@ -14,55 +14,62 @@ from physics.schemes.contacts import Contacts, Strongest
 
 
 class ContactMemory(ABC):
-    """Layout of a memory, and all that reads or writes it outside a step.
+    """Layout of the contact memory of a scheme, and all reading and writing of it outside a step.
 
-    `worlds` is a batch (`physics.world.batch.Batch`); `memory` its array, or one of a snapshot.
+    In the methods `worlds` is a batch (`physics.world.batch.Batch`), and `memory` its array of that name, or the one of
+    a snapshot. `indices` (n,) int64 are those of worlds.
     """
 
     @abstractmethod
     def shape(self, scene: Scene, switches: Any, worlds: int) -> tuple[int, int]:
-        """Rows and columns for so many worlds."""
+        """Number of rows and columns of the memory of a batch of `worlds` worlds; `switches` are those of the plan."""
 
     @abstractmethod
     def rows_per_world(self, bodies: int) -> int:
-        """Rows of one world of so many bodies."""
+        """Number of rows of one world with `bodies` bodies."""
 
     def copy(self, source: np.ndarray, target: np.ndarray) -> None:
-        """Copy all rows."""
+        """Copy the memory `source` of a batch or snapshot into `target`, of equal shape."""
         target[...] = source
 
     @abstractmethod
     def is_valid(self, worlds: Any, memory: np.ndarray) -> bool:
-        """True if a step could have written these numbers: kernels take counts and indices from them."""
+        """True if all counts and indices in `memory`, which kernels use unchecked, are possible for these worlds."""
 
     @abstractmethod
     def room(self, worlds: Any) -> int:
-        """Contacts of one world that there is room for."""
+        """Number of contacts for which one world has room."""
 
     @abstractmethod
     def count(self, worlds: Any, index: int) -> int:
-        """Contacts that one world has."""
+        """Number of contacts of the world `index` in its last step."""
 
     @abstractmethod
     def read(self, worlds: Any, indices: np.ndarray, body: int, strongest: Strongest, out: Contacts) -> None:
-        """Write the contacts of some worlds, of one body or of `EVERY_BODY`, into `out`."""
+        """Write the contacts of the worlds `indices`, of one body or of `EVERY_BODY`, into `out`.
+
+        `strongest` is scratch memory with as many rows as `out` has for a world.
+        """
 
     @abstractmethod
     def add_forces(self, worlds: Any, indices: np.ndarray, out: np.ndarray) -> None:
-        """Add the contact forces on each body [N], world frame, to `out` (n, bodies, 3)."""
+        """Add the contact forces on each body of the worlds `indices` [N], world frame, to `out` (n, bodies, 3)."""
 
     @abstractmethod
     def durations(self, worlds: Any, indices: np.ndarray) -> Any:
-        """Times that the forces acted for [s], as they multiply (n, bodies, 3)."""
+        """Durations of the contact forces [s]: a factor that turns forces (n, bodies, 3) into impulses."""
 
 
 def are_indices(values: np.ndarray, count: int) -> bool:
-    """True if all are whole numbers from 0 to below `count`."""
+    """True if all floats `values` are whole numbers from 0 to `count` - 1."""
     return bool(((values >= 0) & (values < count) & (values == np.floor(values))).all())
 
 
 def call(read: Callable, *arguments) -> None:
-    """Call a kernel whose arguments have the same types each time: to find them out would take ten times as long."""
+    """Call the kernel `read`, whose arguments have the same types in every call.
+
+    Its machine code is looked up once for these types; a look-up in each call would take ten times as long.
+    """
     if read not in _MACHINE_CODE:
         _MACHINE_CODE[read] = compiled(read, arguments)
     _MACHINE_CODE[read](*arguments)

@@ -1,4 +1,4 @@
-"""Contacts of many worlds as arrays with a fixed number of rows for each world: what every scheme's reader fills."""
+"""Contacts of many worlds, as arrays with a fixed number of rows for each world; all schemes fill the same arrays."""
 
 from __future__ import annotations
 
@@ -11,41 +11,41 @@ from physics.html_table import parts_table
 from physics.summary import parts_repr
 
 ROWS_PER_BODY = 12
-"""Rows that contacts are shown in, for each body: a block in a corner touches three walls with four vertices each."""
+"""Default number of contact rows for each body: a block in a corner touches three walls with four vertices each."""
 
 EVERY_BODY = -1
-"""In place of a body: the contacts of all of them."""
+"""Value of an argument `body` that means the contacts of all bodies."""
 
 
 class Contacts(NamedTuple):
     """Contacts of n worlds in the last physics step, in the order of `physics.World.contacts`.
 
-    A world with more contacts than there are rows shows those with the largest forces; of equal forces, the first.
-    Rows are in the order in which the scheme keeps contacts: by body, where bodies meet walls only. Rows without a
-    contact are zero.
+    A world with more contacts than rows shows the contacts with the largest forces; of equal forces, the first. Rows
+    are in the order in which the scheme keeps contacts: by body, where bodies meet walls only. Rows without a contact
+    are zero.
 
-    Force and impulse are those of the last resting stage, as the contact solver worked them out. A stage is the whole
-    physics step where the accuracy has one substep and nothing collides in the step. Otherwise it is the end of the
-    step: the last substep, or what is left of it after the last collision. Impulses of impacts are not among them:
-    `physics.World.read_impacts` tells those. A meeting so slow that a resting stage stops it is part of that stage.
+    Force and impulse are those that the contact solver found for the last resting stage. This stage is the whole
+    physics step if the accuracy has one substep and nothing collides in the step. Otherwise it is the end of the step:
+    the last substep, or the part of it after the last collision. Impulses of impacts are left out:
+    `physics.World.read_impacts` has them. An approach so slow that a resting stage stops it counts as resting.
 
-    Event-driven accuracies have no stages where bodies meet walls only. The force is then the last one that was worked
-    out in the step, and the impulse is this force times the physics step.
+    Event-driven accuracies have no stages where bodies meet walls only. The force is then the last one that was
+    computed in the step, and the impulse is this force times the length of the physics step.
 
     A body that sleeps keeps the contacts with which it fell asleep. Between a reset and the first step there are none.
 
     Attributes
     ----------
     count : (n,) int64
-        Contacts that there are; more than the rows, where some are left out.
+        Number of contacts; it exceeds the number of rows where some contacts have no row.
     point : (n, rows, 3) float64
-        World frame [m].
+        Contact point, world frame [m].
     force : (n, rows, 3) float64
-        Mean over the stage, on the first body, world frame [N].
+        Mean force on the first body over the stage, world frame [N].
     impulse : (n, rows, 3) float64
-        Of the stage, on the first body: the force times the length of the stage, world frame [N s].
+        Impulse on the first body in the stage, the force times the length of the stage, world frame [N s].
     ends : (n, rows, 2) int64
-        First body; other body, or -1 - k for wall k.
+        Index of the first body; index of the other body, or -1 - k for wall k.
     """
 
     count: np.ndarray
@@ -62,14 +62,14 @@ class Contacts(NamedTuple):
 
 
 class Strongest(NamedTuple):
-    """Contacts of one world that are to be shown, in their order."""
+    """Workspace with the strongest contacts of one world, which get rows, in the order of the contact memory."""
 
-    place: np.ndarray  # (rows,) int, place of the contact in its memory
-    size: np.ndarray  # (rows,) square of its force [N²]
+    place: np.ndarray  # (rows,) int, index of the contact in its memory
+    size: np.ndarray  # (rows,) square of the contact's force [N²], or of an impulse
 
 
 def no_contacts(worlds: int, rows: int) -> Contacts:
-    """Arrays of `Contacts` for so many worlds and rows, all zero."""
+    """Make `Contacts` of zeros for `worlds` worlds, with `rows` rows for each."""
     vectors = worlds, rows, 3
     return Contacts(
         np.zeros(worlds, np.int64), np.zeros(vectors), np.zeros(vectors), np.zeros(vectors),
@@ -79,7 +79,10 @@ def no_contacts(worlds: int, rows: int) -> Contacts:
 
 @kernel
 def keep_strongest(kept, place, size, strongest):
-    """Append a contact to those that are kept, where these are full in place of the weakest: how many are kept then."""
+    """Append the contact `place` of strength `size` to the `kept` contacts in `strongest`; return their new number.
+
+    If `strongest` is full the weakest contact is dropped, which may be the new one.
+    """
     rows = strongest.size.shape[0]
     if rows == 0:
         return 0
@@ -99,7 +102,10 @@ def keep_strongest(kept, place, size, strongest):
 
 @kernel
 def put_force_and_impulse(n, row, impulse, length, duration, out):
-    """Write force and impulse of a contact from its impulse in a stage of this length [s]."""
+    """Write force and impulse of a contact into row `row` of world `n` of `out`, a `Contacts`.
+
+    The force is `impulse` / `length`, the impulse is `impulse` * `duration`.
+    """
     for c in range(3):
         out.force[n, row, c] = impulse[c] / length
         out.impulse[n, row, c] = impulse[c] * duration

@@ -1,4 +1,4 @@
-"""Event-driven scheme: bodies at walls, stepped from one change of a contact to the next."""
+"""Event-driven scheme for bodies at walls: smooth motion from one event (impact or change of a contact) to the next."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from physics.schemes.wall_memory import WallMemory
 
 
 class EventDriven(Scheme):
-    """Smooth motion to a tolerance, and every event at its time."""
+    """Event-driven scheme: smooth motion is integrated to a tolerance, and every event is located in time."""
 
     name = "event-driven"
     kernel = staticmethod(step_events)

@@ -1,4 +1,4 @@
-"""Bodies that touch each other: one contact problem for all bodies of a world."""
+"""Time stepping of bodies that touch each other, with one contact problem for all bodies of a world."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
 
 class ManyBodies(Scheme):
-    """Bodies that touch each other; or touch walls, and are tied together by springs or are hulls.
+    """Scheme for bodies that touch each other; also for bodies at walls that are hulls or tied together by springs.
 
     Parameters
     ----------
     is_error_controlled : bool
-        Substeps are cut into parts that meet a tolerance.
+        Whether substeps are cut into parts whose errors meet the tolerance.
     """
 
     name = "bodies that touch"
@@ -59,14 +59,17 @@ class ManyBodies(Scheme):
         )  # fmt: skip
 
     def make_motion(self, scene: Scene, switches: Switches, accuracy: Accuracy) -> Any:
-        """Make room for the world at some moments, where parts are tried; None without error control."""
+        """Make the memory in which error control keeps states of a world while it tries parts; None without it."""
         if not self.is_error_controlled:
             return None
         bodies, walls = len(scene.bodies), len(scene.walls)
         return allocation.make_snapshots(bodies, allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies)))
 
     def acting(self, accuracy: Accuracy) -> Accuracy:
-        """Accuracy that acts: with error control rounding would decide below the least tolerances."""
+        """Accuracy with which the scheme steps: error control raises tolerance and slop to its least values.
+
+        Below these rounding errors would decide whether a part is accepted.
+        """
         if not self.is_error_controlled:
             return accuracy
         tolerance, slop = max(accuracy.tolerance, MIN_SOLVER_TOLERANCE), max(accuracy.slop, MIN_RELATIVE_SLOP)

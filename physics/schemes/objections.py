@@ -1,4 +1,4 @@
-"""Reasons that several schemes have to refuse a scene."""
+"""Reasons for which schemes refuse a scene, as messages; each function returns "" if it has no objection."""
 
 from __future__ import annotations
 
@@ -17,18 +17,21 @@ DECLARED = {
     LAW_TANGENTIAL: "Contact.tangential", LAW_ROLLING: "RollingFriction", LAW_SPIN: "SpinFriction",
     LAW_ANISOTROPY: "Friction with two coefficients", LAW_STIFFNESS: "Contact.stiffness",
 }  # fmt: skip
-"""Laws of contact by what declares them."""
+"""Names of the effects or fields that declare each contact law."""
 
 _OF_STAGES = (LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS)
 
 
 def declared_laws(needs: Needs) -> str:
-    """Names of the laws that a scene declares, with commas."""
+    """Names of the effects or fields with which a scene declares contact laws, joined by commas."""
     return ", ".join(DECLARED[law] for law in needs.laws if law in DECLARED)
 
 
 def to_laws_of_stages(needs: Needs) -> str:
-    """Object to laws that act over a stage of time stepping, and to sleeping, in a scheme with an error tolerance."""
+    """Message against contact laws that act over a stage of time stepping; "" if the scene has none.
+
+    These are rolling friction, spin friction and stiffness.
+    """
     unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
     if unknown:
         return (
@@ -39,7 +42,7 @@ def to_laws_of_stages(needs: Needs) -> str:
 
 
 def to_sleeping(needs: Needs) -> str:
-    """Object to sleeping bodies."""
+    """Message against the effect `Sleeping`, for schemes in which bodies cannot sleep; "" if the scene lacks it."""
     if needs.sleeping:
         return (
             "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
@@ -49,7 +52,7 @@ def to_sleeping(needs: Needs) -> str:
 
 
 def to_tangential(scene: Scene, needs: Needs) -> str:
-    """Object to tangential restitution of bodies that are not spheres."""
+    """Message against tangential restitution in a scene with bodies other than spheres; "" if there is no conflict."""
     for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in needs.laws else ()):
         if body.kind != "sphere":
             return (
@@ -60,7 +63,10 @@ def to_tangential(scene: Scene, needs: Needs) -> str:
 
 
 def to_turns(needs: Needs, accuracy: Accuracy) -> str:
-    """Object to impacts in turn where a step knows what collides within a stage, not at one moment."""
+    """Message against sequential impacts, for schemes that find the collisions of a stage, but not their exact times.
+
+    "" if the accuracy does not ask for sequential impacts, or nothing can touch.
+    """
     if needs.touching and accuracy.collisions == "sequential":
         return (
             f"Accuracy.collisions is 'sequential' with scheme {accuracy.scheme!r}; allowed where bodies touch walls "

@@ -1,26 +1,28 @@
-"""Scheme: a way to step worlds of some scenes, as one object. `physics.schemes` lists them.
+"""Scheme: an object that steps the worlds of some kind of scene. `physics.schemes` lists all schemes.
 
 To add one, copy the module that is nearest to it (`springs` is the shortest), and keep to these rules:
 
 1. Write its kernels in a folder of `physics/kernels`. An entry kernel takes a work queue, a time grid and the arrays of
-   bodies (`physics.kernels.state.groups`), then arguments of its own, and returns nothing. It goes through the worlds
-   by `physics.kernels.parallel.work_stealing.for_each_world`, and adds the wrench of each body to its loads.
+   bodies (`physics.kernels.state.groups`), then arguments of its own, and returns nothing. It visits the worlds with
+   `physics.kernels.parallel.work_stealing.for_each_world`, and adds the wrench of each body to its loads.
 2. Write a module in `physics/schemes` with a subclass of `Scheme`, and `SCHEMES`, a tuple of its instances.
 3. Add the module's name to `MODULES` in `physics/schemes/__init__.py`. The first scheme there that takes a scene steps
-   it: the order matters where two take the same.
-4. `takes` says which scenes are this scheme's, by what can act in them (`Needs`) and by the accuracy. It never raises.
-5. `objection` names what such a scene declares and this scheme does not know: the field, the value, and what is
-   allowed. "" says that it knows everything. A scene that is refused is stepped by no other scheme.
-6. `make_scratch` gives the working memory of one thread, `make_motion` a second one if the kernel has it. A step leaves
-   nothing in it that the next one reads: worlds move between threads.
-7. `memory` is the memory of contacts from one step to the next, and the only reader of it (`ContactMemory`). What
-   starts a solve and what users see come from the same rows. `WallMemory` and `BodyMemory` can be shared.
-8. `arguments` are those of the kernel after the first three, for thread k. Switches that are None are pruned by the
-   compiler; an argument of another type compiles another kernel.
-9. A kernel writes states that are finite, or leaves the world as it was and counts a fault in the report.
+   it; so the order matters where two schemes take the same scene.
+4. `takes` decides whether the scheme takes a scene, from the effects that can act in it (`Needs`) and the accuracy. It
+   never raises an exception.
+5. `objection` names an effect that the scene declares and this scheme does not support: the field, the value, and what
+   is allowed. It returns "" if there is none. No other scheme steps a scene that was refused so.
+6. `make_scratch` makes the workspace of one thread, `make_motion` a second one if the kernel needs it. No step may read
+   there what an earlier step wrote, since worlds move between threads.
+7. `memory` (`ContactMemory`) describes the contacts that are kept from one step to the next, and is their only reader.
+   The start of a solve and the contacts that users see come from the same rows. Schemes may share `WallMemory` and
+   `BodyMemory`.
+8. `arguments` gives the arguments of the kernel after the first three, for thread k. The compiler removes code behind
+   switches that are None; an argument of another type compiles another kernel.
+9. A kernel writes finite states only. If it cannot, it leaves the world as it was and counts a fault in the report.
 
-`tests/schemes` adds a toy scheme by these rules. That results are right is for tests of its own to show: hold it
-against `tests/reference`, and run the hard cases (`rigid-env hard-cases`).
+`tests/schemes` adds a toy scheme by these rules. A new scheme needs tests of its own that its results are right:
+compare it with `tests/reference`, and run the hard cases (`rigid-env hard-cases`).
 """
 
 from __future__ import annotations
@@ -45,14 +47,34 @@ from physics.schemes.contact_memory import ContactMemory
 
 @dataclass(frozen=True)
 class Switches:
-    """Switches that a kernel is compiled for. None is off, True is on.
+    """Effect switches for which a kernel is compiled: True is on, None is off.
 
-    `offset_frame` is on where the body frame of a body is not all there is to know of its mass: its principal axes are
-    not its body axes, or its geometric centre is not its centre of mass. `pivots` is on where the solver of a body may
-    pivot. `integrator` is the code of a textbook integrator of free motion (`physics.accuracy`), None: the exact flow.
-    `meeting` says whether bodies touch each other, `ellipsoids` whether there are any among those, `hulls` whether any
-    hulls touch anything. `sleeping` is on where bodies may sleep. `laws` are those of
-    `physics.kernels.state.contact_law_dispatch`.
+    Attributes
+    ----------
+    contact, friction, restitution, gravity : True or None
+        Whether the effect can act in the scene.
+    gyroscopic : True or None
+        Whether some body has unequal moments of inertia.
+    offset_frame : True or None
+        Whether some body's principal axes are not its body axes, or its geometric centre is not its centre of mass.
+    pivots : True or None
+        Whether pivoting methods may solve the contact problem of a body at walls.
+    integrator : int or None
+        Code of a textbook integrator of free motion (`physics.accuracy.INTEGRATORS`); None: the exact flow.
+    meeting : bool
+        Whether bodies can touch each other.
+    ellipsoids : True or None
+        Whether ellipsoids are among bodies that can touch each other.
+    hulls : True or None
+        Whether hulls can touch walls or bodies.
+    sleeping : True or None
+        Whether bodies may sleep.
+    features : int
+        Features with which a body may touch a wall, as in `Needs`.
+    fields : tuple of FieldSlot
+        Force fields of the scene.
+    laws : tuple of str
+        Contact laws at walls, names from `physics.kernels.state.contact_law_dispatch.LAWS`.
     """
 
     contact: bool | None
@@ -73,26 +95,26 @@ class Switches:
 
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The fields' part in the kernel."""
+        """Terms of the scene's force fields: their functions and columns, as the compiler needs them."""
         return tuple(slot.term for slot in self.fields)
 
     @property
     def of_contact(self) -> ContactSwitches:
-        """Those of contact with walls, as a kernel takes them."""
+        """Switches of contact with walls, grouped as kernels take them."""
         return ContactSwitches(self.contact, self.friction, self.pivots)
 
     @property
     def of_flight(self) -> FlightSwitches:
-        """Those of free motion, as a kernel takes them."""
+        """Switches of free motion, grouped as kernels take them."""
         return FlightSwitches(self.gyroscopic, self.offset_frame, self.integrator)
 
 
 class Worlds(Protocol):
-    """A batch of worlds, as far as a scheme sees it: `physics.world.batch.Batch`."""
+    """Interface of a batch of worlds (`physics.world.batch.Batch`), reduced to the attributes that schemes use."""
 
     @property
     def plan(self) -> Any:
-        """Its `Switches`."""
+        """Plan of the batch, a subclass of `Switches`."""
 
     memory: np.ndarray
     report_table: np.ndarray
@@ -102,26 +124,28 @@ class Worlds(Protocol):
     motions: list
 
     def sleep_of_kernel(self) -> Sleep | None:
-        """Sleep record for the step; None where no body may sleep."""
+        """Record with the array and settings of sleep, as kernels take it; None if bodies do not sleep."""
 
 
 class Scheme(ABC):
-    """A way to step worlds; see the rules at the head of this module.
+    """Base of schemes, which step the worlds of some kind of scene; the head of this module has the rules for them.
 
     Attributes
     ----------
     name : str
+        Name for messages.
     kernel : Callable
-        Entry kernel.
+        Entry kernel, which steps worlds.
     memory : ContactMemory
+        Layout and readers of the scheme's contact memory.
     is_event_driven : bool
-        It steps from event to event, and so makes no error of its own where motion is smooth in between.
+        Whether it steps from event to event, so that the length of a step does not decide the error.
     is_error_controlled : bool
-        Its steps are cut into parts that meet an error.
+        Whether it cuts substeps into parts whose errors meet a tolerance.
     logs_all_events : bool
-        Its log holds all that happens, and not impacts alone.
+        Whether its log holds all events; else only impacts.
     couples_bodies : bool
-        All bodies of a world are in one contact problem, whose solver does not pivot.
+        Whether all bodies of a world share one contact problem, whose solver does not pivot.
     """
 
     name: ClassVar[str]
@@ -134,39 +158,42 @@ class Scheme(ABC):
 
     @abstractmethod
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
-        """True if scenes with such needs are this scheme's."""
+        """True if this scheme takes scenes with these needs at this accuracy."""
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        """Name what the scene declares and this scheme does not know; "" where there is nothing."""
+        """Message about an effect of the scene that this scheme does not support; "" if it supports all."""
         return ""
 
     @abstractmethod
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
-        """Make the working memory of one thread; `walls` is the table of the batch."""
+        """Make the workspace of one thread; `walls` is the table of walls of the batch (walls, WALL_SIZE)."""
 
     def make_motion(self, scene: Scene, switches: Switches, accuracy: Accuracy) -> Any:
-        """Make the second working memory of one thread; None where there is none."""
+        """Make the second workspace of one thread; None if the kernel needs none."""
         return None
 
     def acting(self, accuracy: Accuracy) -> Accuracy:
-        """Accuracy that acts, where the scheme has least tolerances."""
+        """Accuracy with which the scheme really steps, for schemes that raise tolerances to least values."""
         return accuracy
 
     @abstractmethod
     def arguments(self, worlds: Worlds, k: int) -> tuple:
-        """Arguments of the kernel for thread k that it alone has."""
+        """Arguments of this scheme's kernel for thread `k`, after the first three, which all kernels have."""
 
     def __repr__(self) -> str:
         return self.name
 
 
 def records(worlds: Worlds) -> Records:
-    """Arrays that a step keeps and writes besides the state."""
+    """Group the arrays of a batch that a step keeps and writes besides the state: contacts, report and events."""
     return Records(worlds.memory, worlds.report_table, worlds.event_log, worlds.event_counts)
 
 
 def settings(accuracy: Accuracy, impacts_of: int = 1) -> dict[str, Any]:
-    """Numbers of an accuracy as the scratch memories take them; one substep has impacts of so many bodies."""
+    """Numbers of an accuracy, as the functions that make workspaces take them.
+
+    The limit of impacts of a substep is multiplied by `impacts_of`, the number of bodies that share the limit.
+    """
     return {
         "tolerance": accuracy.tolerance, "sweeps": accuracy.iterations, "splits": accuracy.impacts * impacts_of,
         "relative_slop": accuracy.slop, "rest_share": accuracy.rest_share,

@@ -1,4 +1,4 @@
-"""Springs between bodies that touch nothing: one problem of all bodies, by extrapolation or by time stepping."""
+"""Schemes for bodies that springs tie together and that touch nothing: by extrapolation, or by time stepping."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from physics.schemes.wall_memory import WallMemory
 
 
 class LinkedBodies(Scheme):
-    """Bodies that springs tie together, in the air.
+    """Scheme for bodies that springs tie together and that touch nothing; all bodies of a world are stepped together.
 
     Parameters
     ----------
     is_error_controlled : bool
-        Steps are extrapolated to a tolerance.
+        True: steps are extrapolated to a tolerance. False: time stepping.
     """
 
     name = "springs between bodies"

@@ -1,4 +1,7 @@
-"""Contact memory of bodies that meet walls only, a row for each: `half_space.persistent_contacts` of the kernels."""
+"""Contact memory of bodies that meet walls only, a row for each body.
+
+The kernels write it in `physics.kernels.half_space.persistent_contacts`.
+"""
 
 from __future__ import annotations
 
@@ -15,35 +18,35 @@ from physics.scene.scene import Scene
 from physics.schemes.contact_memory import ContactMemory, are_indices, call
 from physics.schemes.contacts import EVERY_BODY, Contacts, Strongest, keep_strongest, put_force_and_impulse
 
-# Rows from which on to look at each is faster than to copy all numbers.
+# From this number of rows on it is faster to copy the contacts of each row than all its numbers.
 MANY_ROWS = 64
 
 
 def slots_of(memory: np.ndarray) -> int:
-    """Contacts that a row has room for."""
+    """Number of contacts for which a row of this memory has room."""
     return (memory.shape[1] - WALL_MEMORY_HEAD) // 4
 
 
 @kernel
 def _slot(i, k, memory):
-    """Slot of contact k of row i."""
+    """Contact slot (wall * features + feature) of contact `k` of the body with row `i`."""
     return int(memory[i, WALL_MEMORY_HEAD + k])
 
 
 @kernel
 def _impulse(i, slot, memory):
-    """Impulse at a slot of row i: normal, tangents of the wall [N s]."""
+    """Impulse at a contact slot of the body with row `i`: along the wall's normal and both tangents [N s]."""
     first = WALL_MEMORY_HEAD + (memory.shape[1] - WALL_MEMORY_HEAD) // 4 + 3 * slot
     return (memory[i, first], memory[i, first + 1], memory[i, first + 2])
 
 
 @entry_kernel
 def copy_wall_memory(source, target):
-    """Copy rows of contact memory; outside its contacts a row is zero.
+    """Copy the rows of one contact memory into another, but only the numbers of contacts; all others stay zero.
 
-    A block in a box has room for 24 contacts, and rests on four: of them a copy takes these. A snapshot of a thousand
-    such rows is as large as the cache of a processor, and its time is that of the memory which it touches. Slots out of
-    range, of a table that no step has written, are left out.
+    A block in a box has room for 24 contacts and rests on four, so that most numbers of a row are zero. A snapshot of a
+    thousand such rows is as large as the cache of a processor, and touching less memory saves time. Slots out of range,
+    as in a table that no step has written, are skipped.
     """
     slots = (source.shape[1] - WALL_MEMORY_HEAD) // 4
     first = WALL_MEMORY_HEAD + slots
@@ -63,7 +66,7 @@ def copy_wall_memory(source, target):
 
 
 class WallArrays(NamedTuple):
-    """Arrays of a batch whose bodies meet walls only."""
+    """Arrays of a batch from which contacts with walls are read; see `physics.world.batch.Batch`."""
 
     memory: np.ndarray
     state: np.ndarray
@@ -74,7 +77,10 @@ class WallArrays(NamedTuple):
 
 @kernel
 def _choose(world, body, arrays, strongest):
-    """Choose the contacts of one world that are shown: how many, and how many there are."""
+    """Choose the strongest contacts of a world, or of a `body` in it; return how many were chosen, and of how many.
+
+    The chosen contacts are written into `strongest`.
+    """
     memory, bodies = arrays.memory, arrays.shapes.shape[0]
     kept, count, room = 0, 0, (arrays.memory.shape[1] - WALL_MEMORY_HEAD) // 4
     for b in range(bodies):
@@ -90,7 +96,7 @@ def _choose(world, body, arrays, strongest):
 
 @kernel
 def _write(n, row, b, i, k, features, duration, arrays, out):
-    """Write contact k of body b, which has row i of the state."""
+    """Write contact `k` of body `b`, whose row of the state is `i`, into row `row` of world `n` of `out`."""
     slot = _slot(i, k, arrays.memory)
     p, wall = _impulse(i, slot, arrays.memory), slot // features
     w = arrays.walls[wall]
@@ -108,7 +114,10 @@ def _write(n, row, b, i, k, features, duration, arrays, out):
 
 @kernel
 def _read(indices, body, features, duration, arrays, strongest, out):
-    """Contacts of some worlds; the impulse of a stage is `duration` times that in the memory."""
+    """Read the contacts of the worlds `indices`, of one body or of `EVERY_BODY`, into `out`.
+
+    Impulses are those in the memory times `duration`; `features` is the number of features of a body.
+    """
     bodies, room = arrays.shapes.shape[0], (arrays.memory.shape[1] - WALL_MEMORY_HEAD) // 4
     for n in range(indices.shape[0]):
         kept, out.count[n] = _choose(indices[n], body, arrays, strongest)
@@ -135,12 +144,12 @@ def _add_forces(indices, memory, walls, features, out):
 
 
 class WallMemory(ContactMemory):
-    """Contacts of bodies with walls, a row for each body.
+    """Memory of the contacts of bodies with walls, a row for each body.
 
     Parameters
     ----------
     holds_forces : bool
-        The memory holds forces, as impulses of a stage of 1 s: a scheme has no stages.
+        Whether the memory holds forces, written as impulses of a stage of 1 s, for a scheme without stages.
     """
 
     def __init__(self, holds_forces: bool = False):

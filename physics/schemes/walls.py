@@ -1,4 +1,4 @@
-"""Bodies at walls, by time stepping: bodies do not touch each other, and each is stepped alone."""
+"""Time stepping of bodies at walls that do not touch each other, so that each body is stepped alone."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from physics.schemes.wall_memory import WallMemory
 
 
 class BodiesAtWalls(Scheme):
-    """Time stepping of each body alone, with Moreau's midpoint step in contact."""
+    """Time-stepping scheme for bodies at walls, each stepped alone, with Moreau's midpoint step in contact."""
 
     name = "bodies at walls"
     kernel = staticmethod(step_worlds)

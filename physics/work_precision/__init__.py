@@ -1,1 +1,1 @@
-"""Error against time of simulations, beside other engines."""
+"""Work-precision diagrams: error against computing time of simulations, of this engine and of others."""

@@ -1,4 +1,4 @@
-"""Front, order and floor of a ladder of errors and times. Pure functions of numbers."""
+"""Pareto front, observed order and plateau of measured errors, steps and times: functions of plain numbers."""
 
 from __future__ import annotations
 
@@ -8,42 +8,41 @@ from itertools import pairwise
 
 import numpy as np
 
-# Two points always lie on a line.
+# Least number of points from which an order is computed, since two points always lie on a line.
 LEAST_POINTS = 3
 
-# Errors that a power of the step explains by less than this share of their variance have no order.
+# Least share of the variance of the errors that a power of the step must explain; else there is no order.
 LEAST_FIT = 0.95
 
-# An error lies on a line through others when it is off by less than this factor.
+# An error lies on a line through others if it is off by at most this factor.
 NEAR = 2.0
 
-# Below this observed order a smaller step does not pay any more: half of the lowest order a convergent scheme has.
+# Below this observed order smaller steps do not pay: it is half of the lowest order that a convergent scheme has.
 FLAT_ORDER = 0.5
 
 
 def front(errors: Sequence[float], costs: Sequence[float], floor: float = 0.0) -> list[int]:
-    """Indices of the points that no other point beats, quickest first.
+    """Indices of the points on the Pareto front of errors and costs, quickest first.
 
-    A point is on the front if every quicker one has a larger error. Errors at or below `floor`, the truth's own error,
-    cannot be told apart and count as equal to it: the quickest of them is on the front. Points that are not finite
-    never are.
+    A point is on the front if every quicker point has a larger error. Errors at or below `floor`, the truth's own
+    error, cannot be told apart and count as equal to it, so that only the quickest of them is on the front. Points
+    that are not finite are never on it.
     """
     found, best = [], math.inf
     order = sorted(range(len(errors)), key=lambda i: (costs[i], errors[i]))
     for i in order:
         seen = max(errors[i], floor)
-        if seen < best:  # false for what is not finite
+        if seen < best:  # false if it is not finite
             found.append(i)
             best = seen
     return found
 
 
 def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Indices of the smallest steps over which the error no longer falls, finest first; empty while it still falls.
+    """Indices of the finest steps over which the error no longer falls, finest first; empty if it falls to the end.
 
-    The tail grows from the finest step towards coarser ones, while the coarser one's error is at most the finer one's
-    times the `FLAT_ORDER`-th power of the ratio of the steps. A single step is no tail. A lucky value in the middle is
-    none either: the finer steps after it fall again.
+    The tail grows from the finest step towards coarser ones, as long as the error of the coarser step is at most that
+    of the finer one times the `FLAT_ORDER`-th power of the ratio of the steps. A single step is no tail.
     """
     order = [i for i in np.argsort(steps, kind="stable") if math.isfinite(errors[i])]
     tail = order[:1]
@@ -55,7 +54,7 @@ def flat_tail(steps: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 
 def plateau(steps: Sequence[float], errors: Sequence[float]) -> float | None:
-    """Smallest error of the `flat_tail`, which smaller steps do not improve. None while the error still falls."""
+    """Smallest error of the `flat_tail`: smaller steps do not improve it. None if the error falls to the end."""
     tail = flat_tail(steps, errors)
     return min(errors[i] for i in tail) if tail else None
 
@@ -63,11 +62,11 @@ def plateau(steps: Sequence[float], errors: Sequence[float]) -> float | None:
 def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float = 0.0) -> float | None:
     """Slope of log error over log step by least squares, where the error falls as a power of the step.
 
-    Left out are, at the fine end, errors at the truth's own `floor` and the `flat_tail` but for its coarsest point, at
-    which the fall ends; at the coarse end, steps too large for the power to show: the fewest such that the rest lie
-    within a factor `NEAR` of their line, at most a quarter of those that fall: more would find a power in noise. None
-    where fewer than `LEAST_POINTS` steps are left, or no rising line explains them (`LEAST_FIT`). Errors that are not
-    finite count as absent.
+    Some points are left out. At the fine end these are errors at or below `floor`, the truth's own error, and all of
+    the `flat_tail` but its coarsest point. At the coarse end they are the largest steps, as few as possible, until the
+    rest lies within a factor `NEAR` of its line; at most a quarter, since more would find a power in noise. Errors
+    that are not finite are left out, too. None is returned if fewer than `LEAST_POINTS` steps remain, or if no rising
+    line explains them (`LEAST_FIT`).
     """
     tail = flat_tail(steps, errors)[:-1]
     falling = [i for i in np.argsort(steps) if math.isfinite(errors[i]) and errors[i] > floor and i not in tail]
@@ -83,7 +82,7 @@ def observed_order(steps: Sequence[float], errors: Sequence[float], floor: float
 
 
 def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
-    """Line through points by least squares: slope, share of the variance that it explains, farthest point from it."""
+    """Fit a line to points by least squares: slope, share of the variance that it explains, largest distance in y."""
     x, y = x - x.mean(), y - y.mean()
     slope = float(x @ y / (x @ x))
     rest = y - slope * x
@@ -91,7 +90,7 @@ def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def lost_from(steps: Sequence[float], is_lost: Sequence[bool]) -> float | None:
-    """Smallest step from which on every larger one is lost; None if the largest is not lost."""
+    """Smallest step such that it and all larger steps are lost; None if the largest step is not lost."""
     found = None
     for i in sorted(range(len(steps)), key=lambda i: -steps[i]):
         if not is_lost[i]:

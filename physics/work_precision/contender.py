@@ -1,4 +1,4 @@
-"""Contender in a measurement of error against time: an engine at one setting and one step."""
+"""Contenders in a measurement of error against time: an engine at one setting and one step."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ OURS = "rigid-env"
 
 
 class TooSlow(Exception):
-    """Error of a contender that takes too long for its measurement; the message says how long."""
+    """Exception of a contender that takes too long for its measurement; the message says how long."""
 
 
 class Contender(Protocol):
-    """An engine at one setting and one step, on one scene.
+    """Protocol of an engine at one setting and one step, on one scene.
 
     Attributes
     ----------
     engine, setting : str
+        Names of the engine and of the setting.
     dt : float
-        [s].
+        Length of a step [s].
     """
 
     engine: str
@@ -36,28 +37,30 @@ class Contender(Protocol):
     dt: float
 
     def watch(self, steps: int) -> Trajectory:
-        """Samples at the start and after each of `steps` steps.
+        """Simulate `steps` steps; return samples at the start and after each step.
 
         Raises
         ------
         TooSlow
-            It gave up; it is left out, and the result says so.
+            The engine gave up. The measurement then leaves it out, and its result says so.
         """
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Two functions: the first returns to the start; the second, which is timed, takes `steps` steps from there."""
+        """Make two functions: the first returns to the start; the second, which is timed, makes `steps` steps."""
 
 
 @dataclass(frozen=True)
 class EngineContender:
-    """Our own engine.
+    """Contender with this package's own engine.
 
     Parameters
     ----------
     scene : Scene
+        Scene to simulate.
     accuracy : Accuracy
+        Setting of the engine.
     dt : float
-        [s].
+        Length of a step [s].
     """
 
     scene: Scene
@@ -67,22 +70,22 @@ class EngineContender:
 
     @property
     def setting(self) -> str:
-        """Name of the preset, or the differences from ``balanced``."""
+        """Name of the accuracy, from `setting_name`."""
         return setting_name(self.accuracy)
 
     def watch(self, steps: int) -> Trajectory:
-        """See `Contender`."""
+        """Simulate `steps` steps; return samples at the start and after each step."""
         return simulate(self.scene, steps * self.dt, self.accuracy, sample_dt=self.dt)
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-        """See `Contender`."""
+        """Make two functions: the first returns to the start; the second makes `steps` steps."""
         world = World(self.scene, dt=self.dt, accuracy=self.accuracy)
         start = world.snapshot()
         return (lambda: world.restore(start)), Stepper(world, steps=steps)
 
 
 def setting_name(accuracy: Preset | Accuracy) -> str:
-    """Name of a preset, or of the nearest preset with the settings that differ: ``balanced(substeps=5)``."""
+    """Name of an accuracy: that of a preset, or the nearest preset with changed fields, as ``balanced(substeps=5)``."""
     knobs = resolve(accuracy)
     changes = {
         name: [f.name for f in fields(knobs) if getattr(knobs, f.name) != getattr(preset, f.name)]

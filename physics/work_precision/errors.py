@@ -1,4 +1,4 @@
-"""Errors of a trajectory against another one, and against laws: plain NumPy, the same for every engine."""
+"""Errors of a trajectory against a true one, and against laws of physics: plain NumPy, the same for all engines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from physics.scene.scene import Scene
 
 
 def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Angle of the rotation from one attitude to another [rad], (...); accurate for small angles.
+    """Angles (...) of the rotations from one attitude to another [rad]; accurate for small angles, too.
 
     Parameters
     ----------
@@ -27,14 +27,19 @@ def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
-    """Upper bound of the distance of a body's points from their true places [m], (samples, bodies).
+    """Upper bound of the distances of a body's points from their true places [m], (samples, bodies).
 
-    |Δx| + 2 r sin(θ/2): a turn by θ moves no point of a body of bounding radius r by more than the chord.
+    The bound is |Δx| + 2 r sin(θ/2): a rotation by θ moves no point of a body of bounding radius r by more than the
+    chord 2 r sin(θ/2).
 
     Parameters
     ----------
+    scene : Scene
+        Scene with the bodies.
     pos, true_pos : (samples, bodies, 3) float64
+        Positions and true positions of the centres of mass [m].
     quat, true_quat : (samples, bodies, 4) float64
+        Attitudes and true attitudes (w, x, y, z).
     """
     radii = np.array([body.bounding_radius(body.dimensions) + np.linalg.norm(body.center) for body in scene.bodies])
     turn = 2.0 * radii * np.sin(0.5 * angles_between(quat, true_quat))
@@ -44,16 +49,17 @@ def distances(scene: Scene, pos, quat, true_pos, true_quat) -> np.ndarray:
 def root_mean_square(difference: np.ndarray) -> float:
     """Root of the mean over samples of the largest |difference|² of any body; `difference` is (samples, bodies, 3).
 
-    It is for velocities, whose largest error would say little: if an impact comes a moment early, the velocity is wrong
-    by the whole impact in this moment, however short that is.
+    It measures errors of velocities. Their largest error would tell little: if an impact comes a moment early, the
+    velocity is wrong by the whole jump during this moment, however short it is.
     """
     return float(np.sqrt(np.mean(np.sum(difference * difference, axis=-1).max(axis=-1))))
 
 
 def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
-    """Kinetic and potential energy [J], (samples, bodies), zero potential at the origin.
+    """Sum of kinetic energy and of the potential energy of gravity [J], (samples, bodies); 0 potential at the origin.
 
-    For samples of another engine; a `Trajectory` of ours has it.
+    It serves samples of other engines; a `Trajectory` of this engine has its energy. The arguments are
+    (samples, bodies, 3|4|3|3), in the world frame.
     """
     gravity = scene.effect(Gravity)
     pull = np.array(gravity.acceleration if gravity else (0.0, 0.0, 0.0))
@@ -65,7 +71,7 @@ def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """True if no energy leaves the scene: no contact, or elastic contact without friction; no drag."""
+    """True if the scene conserves energy: without contact, or with elastic contact without friction; without drag."""
     if any(law is not False for law in _field_laws(scene)):
         return False
     contact, friction = scene.effect(Contact), scene.effect(Friction)
@@ -81,10 +87,10 @@ def _field_laws(scene: Scene) -> list[bool | None]:
 
 
 def energy_error(scene: Scene, energy: np.ndarray) -> float:
-    """Violation of the energy's law by the energy [J] (samples, bodies); bodies must not exchange energy.
+    """Error of the `energy` [J] (samples, bodies) against the scene's law of energy, in J.
 
-    For conserved energy this is the largest departure from the start. Else it is the largest rise above an earlier
-    value, which a passive scene never has; only a truth can tell the right losses. Not a number where a field may give
+    If the scene conserves energy, it is the largest departure of a body's energy from the start. Else it is the largest
+    rise above an earlier value; a passive scene never has one. Bodies must not exchange energy. NaN if a field may add
     energy.
     """
     if None in _field_laws(scene):
@@ -95,7 +101,10 @@ def energy_error(scene: Scene, energy: np.ndarray) -> float:
 
 
 def deepest_penetration(scene: Scene, pos, quat) -> float:
-    """Largest depth of a body in a wall over all samples [m]; 0 where it touches none."""
+    """Largest depth of any body in any wall over all samples [m]; 0 if no wall is touched.
+
+    `pos` (samples, bodies, 3) [m] and `quat` (samples, bodies, 4) are in the world frame.
+    """
     if not scene.walls or scene.effect(Contact) is None:
         return 0.0
     worst = 0.0
@@ -105,12 +114,12 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
             normal = np.array(wall.normal)
             direction = np.einsum("nji,j->ni", R, normal)
             gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, -direction)
-            worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps what is not a number, no -0.0
+            worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps NaN, and turns -0.0 into 0.0
     return worst
 
 
 def _support(body: Body, direction: np.ndarray) -> np.ndarray:
-    """Extent (n,) [m] of a body from its geometric centre along `direction` (n, 3), unit vectors in its own frame."""
+    """Support function (n,) [m] of a body about its geometric centre, for unit vectors (n, 3) in the body frame."""
     if body.kind == "hull":
         return (direction @ body.polyhedron.vertices.T).max(axis=-1)
     scaled = direction * body.dimensions
@@ -120,14 +129,15 @@ def _support(body: Body, direction: np.ndarray) -> np.ndarray:
 
 
 def event_error(events: Sequence, true: Sequence) -> float | None:
-    """Worst difference of the times of the same events [s]; None if no events can be matched.
+    """Largest difference of the times of corresponding events [s]; None if no events correspond.
 
-    Events are paired by kind, in order of time. A kind counts only if both runs have equally many events of it;
-    otherwise a pairing would be a guess. A fault is no event of the scene.
+    Events of one kind correspond in the order of time. A kind counts only if both sequences have equally many events
+    of it; otherwise any pairing would be a guess. Faults are ignored.
 
     Parameters
     ----------
     events, true : sequence of Event
+        Events of a trajectory, and the true ones.
     """
     worst = None
     for kind in {event.kind for event in events} - {"fault"}:

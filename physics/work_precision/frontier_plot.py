@@ -1,4 +1,4 @@
-"""Error against time as a picture: both axes logarithmic, a line for each setting."""
+"""Work-precision diagram as a picture: error over computing time, both logarithmic, with a line for each setting."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 PANEL = (5.0, 3.9)  # [inch]
 DPI = 130
 
-# Our settings are circles, one colour each; an engine is one marker and colour.
+# Settings of this engine are circles with a colour for each; every other engine has one marker and one colour.
 OUR_COLOURS = ("#56b4e9", "#0072b2", "#009e73", "#003f5c", "#66a182")
-OUR_SIZES = (8.5, 6.5, 4.5)  # of circles: where settings coincide, both show [pt]
+OUR_SIZES = (8.5, 6.5, 4.5)  # of circles [pt]; different, so that settings which coincide can both be seen
 PEER_STYLES = (("^", "#d55e00"), ("s", "#cc79a7"), ("D", "#e69f00"), ("v", "#8c6bb1"))
 PEER_SIZE = 4.0  # [pt]
 INK, PALE, GOLD = "#222222", "#8a8a8a", "#f0c000"
 
-# Decades below the smallest error above zero, or goal, at which an error of exactly zero is drawn.
+# An error of exactly zero is drawn so many decades below the smallest error above zero, or goal.
 ZERO_GAP = 0.7
 
 Style = tuple[str, str, float]
@@ -32,7 +32,7 @@ Goals = Sequence[tuple[float, float]]
 
 
 def plot_frontier(frontier: Frontier, path: str | Path | None = None) -> Any:
-    """Draw one frontier into a figure of its own, and write it if a path is given."""
+    """Draw one frontier into a new figure, write it to `path` if that is given, and return the figure."""
     load_optional("matplotlib", "a plot")
     figure, (panel,) = make_figure(1, 1)
     draw_panel(panel, frontier, styles_of([frontier]), f"{frontier.measure} error", f"truth: {frontier.truth}")
@@ -43,7 +43,7 @@ def plot_frontier(frontier: Frontier, path: str | Path | None = None) -> Any:
 
 
 def make_figure(rows: int, columns: int) -> tuple[Any, list[Any]]:
-    """Make a figure with panels, to be written without a display."""
+    """Make a figure with rows and columns of panels, for files; return it and the list of its panels."""
     figure = load_optional("matplotlib.figure", "a plot").Figure(
         figsize=(PANEL[0] * columns, PANEL[1] * rows), dpi=DPI, layout="constrained"
     )
@@ -52,7 +52,7 @@ def make_figure(rows: int, columns: int) -> tuple[Any, list[Any]]:
 
 
 def add_legend(figure, panels: Sequence) -> None:
-    """Add one legend below all panels, each entry once, no wider than the figure, which grows by its height."""
+    """Add one legend below all panels, with each entry once; the figure becomes higher to make room for it."""
     entries: dict[str, Any] = {}
     for panel in panels:
         for handle, label in zip(*panel.get_legend_handles_labels()):
@@ -70,7 +70,7 @@ def add_legend(figure, panels: Sequence) -> None:
 
 
 def styles_of(frontiers: Sequence[Frontier]) -> dict[str, Style]:
-    """Marker, colour and size by name of a family: our settings, and the other engines."""
+    """Choose marker, colour and size for each line of some frontiers: a setting of this engine, or another engine."""
     families = dict.fromkeys(family for frontier in frontiers for family in frontier.families())
     ours = [setting for engine, setting in families if engine == OURS]
     theirs = dict.fromkeys(engine for engine, _ in families if engine != OURS)
@@ -88,13 +88,15 @@ def draw_panel(
     Parameters
     ----------
     panel : matplotlib.axes.Axes
+        Panel to draw into.
     frontier : Frontier
+        Measured points.
     styles : mapping
-        As of `styles_of`.
+        Styles by name, from `styles_of`.
     title, about : str
-        Above the panel, at the left and at the right.
+        Texts above the panel, at the left and at the right.
     goals : sequence of (float, float)
-        Errors, and times for them in µs per simulated second.
+        Goals to mark: an error, and a time in µs per simulated second.
     """
     unit = frontier.units[frontier.measure]
     seen = [e for p in frontier.points if math.isfinite(e := frontier.error(p)) and e > 0]
@@ -118,7 +120,7 @@ def draw_panel(
 
 
 def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
-    """One setting over all steps: a thin line, its points, and hollow ones where the error is zero or lost."""
+    """Draw one setting over all steps: a thin line and its points, hollow if the error is 0 or the point is lost."""
     shown = [(1e6 * p.cost, frontier.error(p), p.is_lost) for p in points if math.isfinite(frontier.error(p))]
     if not shown:
         return
@@ -139,7 +141,10 @@ def _draw_family(panel, frontier, points, zero, style, engine, name) -> None:
 
 
 def _draw_regions(panel, frontier: Frontier, goals: Goals, zero: float) -> None:
-    """Draw the Pareto front as stairs, and the region that reaches a goal; called last, so that the limits stay."""
+    """Draw the Pareto front as stairs, and shade the region that reaches a goal.
+
+    It must be called after all points are drawn, since it keeps the limits of the axes.
+    """
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
     front = frontier.front()
     if front:

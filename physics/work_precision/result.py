@@ -1,4 +1,4 @@
-"""Result of a measurement of error against time: the points, and the answers that they give."""
+"""Result of a measurement of error against time: its points, and answers from them, such as the quickest setting."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from physics.work_precision.frontier_plot import plot_frontier
 
 @dataclass(frozen=True)
 class FrontierPoint:
-    """One engine at one setting and one step.
+    """Measured errors and times of one engine at one setting and one step.
 
     Attributes
     ----------
     engine, setting : str
+        Names of the engine and of the setting.
     dt : float
-        Step [s].
+        Length of a step [s].
     errors : dict of float
-        By measure, in its unit (see `Frontier.units`); a measure that could not be taken is missing.
+        Error by name of the measure, in its unit (see `Frontier.units`); measures that could not be taken are missing.
     costs : tuple of float
-        Wall-clock time per simulated second [s], of each repeat; compiling is not in it.
+        Wall-clock time per simulated second [s] of each repeat, without compilation.
     is_lost : bool
-        It no longer follows the truth: a state or an error is not finite, or the error is larger than half of what
-        happens in the scene (`run.LOST_SHARE`).
+        Whether the simulation no longer follows the truth: a state or an error is not finite, or the error exceeds
+        half of the scale of the truth (`run.LOST_SHARE`).
     note : str
-        What the engine's reports say where not all is well, else "".
+        Message of the engine's reports if not all are OK, else "".
     """
 
     engine: str
@@ -60,27 +61,29 @@ class FrontierPoint:
 
 @dataclass(frozen=True)
 class Frontier:
-    """Error against time of one scene.
+    """Error against time of one scene, measured for several settings and steps.
 
-    Wherever a method takes `measure`, None stands for the one in the attribute of that name.
+    In all methods `measure` names an error measure, and None stands for the attribute `measure`; `engine` None stands
+    for all engines.
 
     Attributes
     ----------
     points : tuple of FrontierPoint
+        Measured points.
     measure : str
-        What `error` means where nothing else is said: ``pose`` against the reference, ``error`` against a `Truth`.
+        Default error measure: ``pose`` if the truth is the reference, ``error`` if it is a `Truth`.
     units : dict of str
-        Of each measure.
+        Unit of each measure.
     floors : dict of float
-        The truth's own error, per measure: at or below it points cannot be told apart.
+        The truth's own error in each measure; errors at or below it cannot be told apart.
     truth : str
-        What the truth is.
+        Description of the truth.
     duration : float
         Simulated time [s].
     is_complete : bool
-        False: interrupted; the points are those measured until then.
+        Whether all settings were measured; False after an interruption.
     skipped : tuple of str
-        Who was left out, and why.
+        Contenders that were left out, with the reasons.
     """
 
     points: tuple[FrontierPoint, ...]
@@ -95,25 +98,25 @@ class Frontier:
     # --- points ------------------------------------------------------------------------------------------------
 
     def error(self, point: FrontierPoint, measure: str | None = None) -> float:
-        """Error of a point in a measure; infinite if it is missing or not a number."""
+        """Error of a point in a measure, in its unit; infinite if it is missing or NaN."""
         value = point.errors.get(self._measure(measure), math.inf)
         return value if not math.isnan(value) else math.inf
 
     def own_error(self, measure: str | None = None) -> float:
-        """Own error of the truth in a measure; 0 if the measure needs no truth (energy, penetration)."""
+        """The truth's own error in a measure, in its unit; 0 if the measure needs no truth (energy, penetration)."""
         return float(self.floors.get(self._measure(measure), 0.0))
 
     def is_at_floor(self, point: FrontierPoint, measure: str | None = None) -> bool:
-        """True if a point's error is at most the truth's own error; its real error is unknown."""
+        """True if a point's error is at most the truth's own error, so that its real error is unknown."""
         return self.error(point, measure) <= self.own_error(measure)
 
     def of(self, setting: object = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:
-        """Points of a setting (a name, or an `Accuracy`) and an engine, coarsest step first; None: of all.
+        """Points of a setting (a name or an `Accuracy`; None: all) and an engine (None: all), coarsest step first.
 
         Raises
         ------
         ValueError
-            There is none.
+            No point has this setting and engine.
         """
         given: Any = setting
         name = setting if setting is None or isinstance(setting, str) else setting_name(given)
@@ -124,7 +127,7 @@ class Frontier:
         return tuple(sorted(found, key=lambda p: -p.dt))
 
     def front(self, measure: str | None = None, engine: str | None = None) -> tuple[FrontierPoint, ...]:
-        """The Pareto front, quickest first: each is more accurate than all that are quicker."""
+        """Points of the Pareto front, quickest first: each is more accurate than all quicker points."""
         some = [p for p in self.of(engine=engine) if not p.is_lost]
         errors = [self.error(p, measure) for p in some]
         found = frontier_analysis.front(errors, [p.cost for p in some], self.own_error(measure))
@@ -133,16 +136,16 @@ class Frontier:
     # --- answers -----------------------------------------------------------------------------------------------
 
     def cheapest(self, error: float, measure: str | None = None, engine: str | None = None) -> FrontierPoint | None:
-        """Quickest setting whose error is at most `error`; None if none was shown to be (see `advice`).
+        """Quickest point whose error is at most `error`; None if there is none, or if `error` is below the truth's own.
 
-        The truth's own error counts: below it, nothing can be shown.
+        `advice` tells the reason.
         """
         error = float(validation.positive(error, (), "error"))
         good = [p for p in self.front(measure, engine) if max(self.error(p, measure), self.own_error(measure)) <= error]
         return good[0] if good else None
 
     def advice(self, error: float, measure: str | None = None, engine: str | None = None) -> str:
-        """`cheapest` as a sentence, with the reason if there is none."""
+        """Sentence about the quickest point with an error of at most `error`, or the reason why there is none."""
         point, unit = self.cheapest(error, measure, engine), self.units[self._measure(measure)]
         goal = f"{error:g} {unit}".rstrip()
         if point is not None:
@@ -156,26 +159,26 @@ class Frontier:
         return f"below {goal}: no setting that was measured; the best is {front[-1]}, error {best:.2g}"
 
     def order(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
-        """Observed order of a setting: slope of log error over log step where the error falls; None if none shows."""
+        """Observed order of a setting: slope of log error over log step where the error falls; None if it has none."""
         some = [p for p in self.of(setting, engine) if not p.is_lost]
         errors = [self.error(p, measure) for p in some]
         return frontier_analysis.observed_order([p.dt for p in some], errors, self.own_error(measure))
 
     def plateau(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
-        """Error that smaller steps of a setting do not improve; None while its error still falls.
+        """Error of a setting that smaller steps do not improve; None if the error falls to the smallest step.
 
-        Its cause is rounding if the setting converges, its tolerances if they are coarser, or its model.
+        The cause is rounding, or the tolerances of the setting, or a model that differs from that of the truth.
         """
         some = [p for p in self.of(setting, engine) if not p.is_lost]
         return frontier_analysis.plateau([p.dt for p in some], [self.error(p, measure) for p in some])
 
     def lost_from(self, setting: object, engine: str = OURS) -> float | None:
-        """Smallest step [s] from which on a setting is lost at every larger one; None if it never is."""
+        """Smallest step [s] such that a setting is lost at it and at all larger steps; None if there is none."""
         some = self.of(setting, engine)
         return frontier_analysis.lost_from([p.dt for p in some], [p.is_lost for p in some])
 
     def families(self) -> tuple[tuple[str, str], ...]:
-        """Every measured (engine, setting), in that order."""
+        """All measured pairs (engine, setting), each once, in the order of the points."""
         return tuple(dict.fromkeys((p.engine, p.setting) for p in self.points))
 
     __repr__ = parts_repr
@@ -196,12 +199,12 @@ class Frontier:
         Parameters
         ----------
         path : str or Path, optional
-            File to write, in a format that matplotlib knows by its ending.
+            Picture to write; its ending chooses a format of matplotlib. None: no file.
 
         Returns
         -------
         matplotlib.figure.Figure
-            Microseconds per simulated second and error, on logarithmic axes. A notebook shows it.
+            Error over microseconds per simulated second, on logarithmic axes. A notebook shows it.
 
         Raises
         ------
@@ -211,7 +214,7 @@ class Frontier:
         return plot_frontier(self, path)
 
     def to_dict(self) -> dict:
-        """Frontier ready for JSON; numbers that are not finite are None."""
+        """Convert the frontier to a dictionary for JSON; numbers that are not finite become None."""
         front = self.front()
         rows = [
             {

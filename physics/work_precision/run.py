@@ -1,4 +1,4 @@
-"""Measure error against time: `frontier` for a scene of yours, `measure` for any contenders, peers too."""
+"""Measurement of error against time: `frontier` for this engine on a scene, `measure` for contenders of any engine."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from physics.world.report import Status
 
 SHOWN_PRESETS: tuple[Preset, ...] = ("fast", "balanced", "precise")
 STEPS = (0.02, 0.01, 0.005, 0.002, 0.001)  # [s]
-COARSE_STEPS = (0.1, 0.05)  # of an event-driven scheme besides, which is as exact there and pays less [s]
+COARSE_STEPS = (0.1, 0.05)  # further steps of event-driven schemes, which are as exact and quicker with them [s]
 REPEATS = 5
 
-# An error larger than this share of what happens in the scene follows it no longer.
+# A simulation is lost if its error exceeds this share of the scale of the truth, the size of the motion in the scene.
 LOST_SHARE = 0.5
 
-# A timed run takes at least this long, so that the clock's grain and a call's overhead do not show [s].
+# Least time of a timed measurement [s], so that the clock's resolution and the cost of a call do not matter.
 LEAST_TIME = 2e-3
 
-# A peer whose run took this long needs no other one to warm up [s].
+# A peer whose first run took at least this long [s] needs no second one to warm up.
 LONG_TIME = 1.0
 
-# No further repeat of a contender whose repeats took this long together [s].
+# A contender gets no further repeats once its repeats have taken this long together [s].
 BUDGET = 5.0
 
-# Steps are taken for fractions with denominators up to this, to find the times they have in common.
+# Steps are rounded to fractions with denominators up to this, to find the times that they have in common.
 LARGEST_DENOMINATOR = 10**6
 
 Progress = Callable[[int, int, str], None]
@@ -51,9 +51,9 @@ Progress = Callable[[int, int, str], None]
 def ladder(
     accuracies: Sequence[Preset | Accuracy] = SHOWN_PRESETS, steps: Sequence[float] | None = None
 ) -> list[tuple[Preset | Accuracy, float]]:
-    """Every accuracy at every step [s]: the `settings` of `frontier`.
+    """Combine every accuracy with every step [s]; the result is an argument `settings` of `frontier`.
 
-    Without `steps` the steps are `STEPS`, and for event-driven settings also `COARSE_STEPS`.
+    Without `steps` the steps are `STEPS`, and for event-driven accuracies also `COARSE_STEPS`.
     """
     if isinstance(accuracies, (str, Accuracy)) or not isinstance(accuracies, Iterable):
         raise ValueError(f"accuracies is {shown(accuracies)}; allowed is a list of presets and physics.Accuracy(...)")
@@ -81,35 +81,38 @@ def frontier(
     repeats: int = REPEATS,
     progress: Progress | None = None,
 ) -> Frontier:
-    """Measure error against time for one scene.
+    """Measure error against time of this engine for one scene.
 
-    Every setting is run, compared with the truth and timed on one thread, in turns with the others. An interruption
-    (Ctrl-C) ends the measurement, not the program: the results until then are returned.
+    Every setting is run, compared with the truth and timed on one thread; settings take turns. An interruption (Ctrl-C)
+    ends the measurement but not the program: the results so far are returned.
 
     Parameters
     ----------
     scene : Scene
+        Scene to simulate.
     duration : float
-        Simulated time [s]; of it, the largest whole multiple of the time that all steps have in common.
+        Simulated time [s]; it is rounded down to a whole multiple of the shortest time that is a multiple of all steps.
     settings : iterable of (str or Accuracy, float), optional
-        Accuracy and step [s]; None: `ladder()`, without coarse steps if the duration is shorter than they are.
+        Pairs of an accuracy and a step [s]. None: `ladder()`; if the duration is shorter than the coarse steps, without
+        them.
     truth : Truth, or callable, optional
-        An outcome you know: `Trajectory` -> error. None: `ReferenceTruth`.
+        Known outcome; a callable takes a `Trajectory` and returns its error. None: `ReferenceTruth`.
     repeats : int
-        Timed runs of each setting; fewer where they take more than `BUDGET` together.
+        Timed runs of each setting; fewer if they take more than `BUDGET` seconds together.
     progress : callable, optional
-        (done, total, what): told before each run.
+        Function (done, total, what) that is called before each run, with counts of runs and a description.
 
     Returns
     -------
     Frontier
+        Errors and times of all settings.
 
     Raises
     ------
     ValueError
         A parameter out of range, or steps that have no common time within the duration.
     KeyboardInterrupt
-        Interrupted before there was a truth to compare with.
+        An interruption came before the truth was known.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     if progress is not None and not callable(progress):
@@ -132,7 +135,10 @@ def measure(
     repeats: int = REPEATS,
     progress: Progress | None = None,
 ) -> Frontier:
-    """As `frontier`, for contenders of any engine; without `truth`, at least one must be ours."""
+    """Measure error against time of contenders of any engine on one scene; other arguments are those of `frontier`.
+
+    Without `truth`, at least one contender must be of this engine.
+    """
     repeats = validation.count(repeats, "repeats")
     duration, sample_dt = common_times(duration, [c.dt for c in contenders])
     reference = _as_truth(truth, scene, duration, sample_dt, contenders)
@@ -162,14 +168,14 @@ def measure(
 
 
 class _Turn:
-    """Errors of one contender, and the times of its runs so far."""
+    """Measurement of one contender: its errors, and the times of its runs so far."""
 
     def __init__(self, contender: Contender, scene: Scene, truth: Truth | ReferenceTruth, duration: float):
         self.contender, self.steps = contender, round(duration / contender.dt)
         start = time.perf_counter()
         trajectory = contender.watch(self.steps)
         watched = time.perf_counter() - start
-        with np.errstate(over="ignore", invalid="ignore"):  # what has blown up is lost, and no warning
+        with np.errstate(over="ignore", invalid="ignore"):  # a simulation that blew up is marked as lost below
             self.errors = {
                 **truth.errors(trajectory),
                 "energy": energy_error(scene, trajectory.energy),
@@ -179,14 +185,14 @@ class _Turn:
         self.note = _note(trajectory)
         self.restart, self.run = contender.runner(self.steps)
         self.runs = 1
-        self.first = watched  # compiles and warms up: counts only where nothing else does
+        self.first = watched  # it includes compilation, and is used only if no run is timed
         if watched < LONG_TIME or contender.engine == OURS:
             self.first = self._seconds(1)
             self.runs = 1 if self.first >= LEAST_TIME else math.ceil(LEAST_TIME / max(self._seconds(1), 1e-9))
         self.seconds: list[float] = []
 
     def _seconds(self, runs: int) -> float:
-        """Wall-clock time of one run, mean of some [s]."""
+        """Wall-clock time of one run [s], as a mean of `runs` runs."""
         total = 0.0
         for _ in range(runs):
             self.restart()
@@ -196,24 +202,27 @@ class _Turn:
         return total / runs
 
     def time(self) -> None:
-        """Run once more, unless the runs so far took too long."""
+        """Make one more timed repeat, unless the repeats so far took `BUDGET` seconds."""
         if sum(self.seconds) * self.runs < BUDGET:
             self.seconds.append(self._seconds(self.runs))
 
     def point(self) -> FrontierPoint:
-        """Measured point; a contender without timed runs has its warm-up's time."""
+        """Make the measured point; a contender without timed repeats gets the time of its first run."""
         c, simulated = self.contender, self.steps * self.contender.dt
         costs = tuple(value / simulated for value in self.seconds or [self.first])
         return FrontierPoint(c.engine, c.setting, c.dt, self.errors, costs, self.is_lost, self.note)
 
 
 def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]:
-    """(duration, sample_dt) [s]: `sample_dt` is the shortest multiple of all steps, `duration` a multiple of it.
+    """Find the times at which all steps [s] can be compared; return (duration, sample_dt) [s].
+
+    `sample_dt` is the shortest time that is a whole multiple of every step. The duration is rounded down to a whole
+    multiple of it.
 
     Raises
     ------
     ValueError
-        There is none within the duration, or no step.
+        There are no steps, or `sample_dt` would exceed the duration.
     """
     duration = float(validation.positive(duration, (), "duration"))
     if not steps:
@@ -233,7 +242,7 @@ def common_times(duration: float, steps: Sequence[float]) -> tuple[float, float]
 
 
 def _pairs(settings: Iterable) -> dict[str, tuple]:
-    """Settings with their names in messages."""
+    """Check the form of `settings`; return the pairs (accuracy, step) by their names in messages."""
     if isinstance(settings, (str, Accuracy)) or not isinstance(settings, Iterable):
         raise ValueError(f"settings is {shown(settings)}; allowed is a list of (preset or physics.Accuracy, step in s)")
     pairs = list(settings)
@@ -275,7 +284,7 @@ def _name(contender: Contender) -> str:
 
 
 class _Counter:
-    """Counter that tells a progress callback the number of finished runs."""
+    """Counter of finished runs, which calls the callback `progress` before each of `total` runs."""
 
     def __init__(self, progress: Progress | None, total: int):
         self.progress, self.total, self.done = progress, total, 0

@@ -1,4 +1,4 @@
-"""Truth for a trajectory: one of the caller, or our own reference at two settings."""
+"""Truths against which trajectories are measured: an outcome known to the caller, or runs at preset ``reference``."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from physics.scene.scene import Scene
 from physics.summary import shown
 from physics.work_precision.errors import angles_between, distances, event_error, root_mean_square
 
-# Units of what is measured of every scene; "error" is what a `Truth` returns, in its own unit.
+# Unit of each error measure; "error", which a `Truth` returns, has its own unit.
 UNITS = {
     "pose": "m",
     "position": "m",
@@ -31,29 +31,32 @@ UNITS = {
     "penetration": "m",
 }
 
-# The looser of the two reference runs has its tolerances larger by this, and its step twice as long.
+# The looser of two reference runs has tolerances larger by this factor, and steps twice as long.
 LOOSER = 10.0
 
-# Two sample times are the same within this share of the time between two that are compared.
+# Two sample times count as equal within this share of the time between two compared samples.
 SAME_TIME = 1e-6
 
 
 @known_keywords
 @dataclass(frozen=True)
 class Truth:
-    """Outcome known to the caller.
+    """Outcome of a simulation that is known to the caller, such as a closed form.
 
     Parameters
     ----------
     error : callable
-        `Trajectory` -> how far from the truth it is, in `unit`; infinite or not a number: it does not get there.
+        Takes a `Trajectory` and returns its distance from the known outcome, in `unit`; infinity or NaN if the
+        trajectory never comes near it.
     unit : str
+        Unit of the error.
     own_error : float
-        Of the truth itself, in `unit`: smaller errors tell nothing.
+        Error of the known outcome itself, in `unit`; smaller errors tell nothing.
     scale : float, optional
-        What makes an error as large as what happens (see `FrontierPoint.is_lost`), in `unit`; None: unknown.
+        Size of the motion in the scene, in `unit`: a trajectory with an error of half of it is lost (see
+        `FrontierPoint.is_lost`). None: unknown.
     text : str
-        What it is, for people.
+        Description of the truth for people.
 
     Raises
     ------
@@ -80,36 +83,38 @@ class Truth:
 
     @property
     def floors(self) -> dict[str, float]:
-        """The truth's own error."""
+        """The truth's own error, by name of the measure."""
         return {"error": float(self.own_error)}
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each measure."""
+        """Unit of the error, by name of the measure."""
         return {"error": self.unit}
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:
-        """Errors of a trajectory."""
+        """Error of a trajectory, by name of the measure."""
         return {"error": float(self.error(trajectory))}
 
 
 class ReferenceTruth:
-    """Truth by the preset ``reference``, and its agreement with itself.
+    """Truth from runs of this engine at the preset ``reference``, with an estimate of its own error.
 
-    Two runs: one at half the finest step of the ladder, one at the finest step and with tolerances ten times as large.
-    The first is the truth, the difference its own stated error: a setting that is better than that cannot be told
+    There are two runs: one at half the finest step of the ladder, and one at the finest step with tolerances ten times
+    as large. The first run is the truth, and the difference of the two is its own error. Errors below it cannot be told
     apart.
 
     Parameters
     ----------
     scene : Scene
+        Scene to simulate.
     duration : float
-        [s], a whole multiple of `sample_dt`.
+        Simulated time [s], a whole multiple of `sample_dt`.
     sample_dt : float
-        Trajectories are compared every `sample_dt` [s].
+        Time between the samples that are compared [s].
     dt : float
         Finest step of the ladder [s]; it divides `sample_dt`.
     accuracy : str or Accuracy
+        Accuracy of the first run.
     """
 
     measure = "pose"
@@ -123,40 +128,40 @@ class ReferenceTruth:
 
     @cached_property
     def true(self) -> Trajectory:
-        """Run that counts as the truth."""
+        """Trajectory of the first run, which counts as the truth."""
         return simulate(self.scene, self.duration, self.best, sample_dt=0.5 * self.dt)
 
     @cached_property
     def floors(self) -> dict[str, float]:
-        """Difference of the two runs, per measure."""
+        """The truth's own error in each measure: the difference of the two runs."""
         looser = replace(self.best, tolerance=LOOSER * self.best.tolerance, slop=LOOSER * self.best.slop)
         return self.errors(simulate(self.scene, self.duration, looser, sample_dt=self.dt))
 
     @cached_property
     def scale(self) -> float:
-        """Largest distance of a point of a body from its start [m]."""
+        """Size of the motion: largest distance of a point of a body from its place at the start [m]."""
         pos, quat = self.true.pos, self.true.quat
         return float(distances(self.scene, pos, quat, pos[:1], quat[:1]).max())
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each measure."""
+        """Unit of each error measure, by its name."""
         return {name: UNITS[name] for name in ("pose", "position", "orientation", "linvel", "angvel", "event_time")}
 
     @property
     def text(self) -> str:
-        """Describe the truth in words."""
+        """Description of the truth for people: the steps of the two runs."""
         return f"reference at {500 * self.dt:g} ms, against itself at {1e3 * self.dt:g} ms with looser tolerances"
 
     def errors(self, trajectory: Trajectory) -> dict[str, float]:
-        """Errors of a trajectory at the times of the comparison.
+        """Errors of a trajectory, which must have samples at the times of the comparison.
 
         Returns
         -------
         dict
             ``pose`` [m] (see `errors.distances`), ``position`` [m] and ``orientation`` [rad]: the largest over
-            samples and bodies; ``linvel`` [m/s] and ``angvel`` [rad/s]: root mean square over the samples of the worst
-            body; ``event_time`` [s] where events can be paired (see `errors.event_error`).
+            samples and bodies. ``linvel`` [m/s] and ``angvel`` [rad/s]: `errors.root_mean_square`. ``event_time`` [s]:
+            `errors.event_error`, missing if no events correspond.
         """
         mine, theirs = rows_at(trajectory.t, self.times), rows_at(self.true.t, self.times)
         pos, true_pos = trajectory.pos[mine], self.true.pos[theirs]
@@ -173,12 +178,12 @@ class ReferenceTruth:
 
 
 def rows_at(t: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Indices of the samples `t` (n,) that lie at `times` (m,) [s].
+    """Indices (m,) of the samples with times `t` (n,) [s] that lie at `times` (m,) [s].
 
     Raises
     ------
     ValueError
-        There is none at one of them.
+        No sample lies at one of these times.
     """
     slack = SAME_TIME * (times[1] - times[0])
     rows = np.minimum(np.searchsorted(t, times - slack), len(t) - 1)

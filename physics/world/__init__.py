@@ -1,1 +1,1 @@
-"""Worlds: the arrays of a batch, and the step that advances them."""
+"""Worlds: batches of copies of a scene with states of their own, and their steps, states, reports and snapshots."""

@@ -1,15 +1,17 @@
-"""Actuator of a world: it turns the commanded wrench into the acting one, before the kernel.
+"""Actuator of a world: it turns the commanded wrench into the acting wrench, before the kernel runs.
 
-A command is held over a step. Delayed, it is a staircase whose treads begin `delay` after the steps in which it was
-given; each tread is clipped. Behind it stands the lag τ w' = c - w, which over a tread of length h with command c takes
+A command holds for a step. Commands over time form a staircase, with a tread for each command; with a delay a tread
+begins `delay` after its step began. The lengths of a tread's force and torque are limited. The acting wrench w then
+follows the command c with the lag τ w' = c - w. Over a tread of length h the exact solution is
 
-    w -> c + (w - c) e^(-h/τ),    mean over the tread  c + (w - c) (τ/h) (1 - e^(-h/τ)),
+    w -> c + (w - c) e^(-h/τ),    mean over the tread  c + (w - c) (τ/h) (1 - e^(-h/τ)).
 
-both exact. The kernel holds over a step the mean of w over it: momentum at the end of every step is exact, place and
-attitude are of second order in the step, as with anything that is held.
+The kernel applies the mean of w over a step throughout that step. So momentum is exact at the end of every step, and
+position and attitude are of second order in the length of the step.
 
-A command is known by its age. Times since the start of a batch would round otherwise in a batch whose worlds begin at
-other times. Loads that are no commands, such as a gust, go past the actuator: `Actuation.passed_by`.
+A delayed command is stored with its age, not with the time at which it was given: ages round the same in all batches,
+whatever the times at which their worlds began. Loads that are no commands, such as gusts, bypass the actuator:
+`Actuation.passed_by`.
 """
 
 from __future__ import annotations
@@ -30,7 +32,7 @@ from physics.world.report import add_report
 if TYPE_CHECKING:
     from physics.parallel.bound_call import BoundCall
 
-# Treads shorter than this share of the step are rounding of the times they lie between.
+# A tread shorter than this share of the step is a rounding error of the times between which it lies, and is left out.
 NO_TIME = 1e-9
 
 
@@ -40,17 +42,18 @@ class Actuation:
     Parameters
     ----------
     actuator : Actuator
+        The effect of the scene, with delay, limits and lag.
     shape : tuple of int
-        (worlds, bodies, 6).
+        Shape of the wrenches, (worlds, bodies, 6).
 
     Attributes
     ----------
     applied : (worlds, bodies, 6) float64
-        What acts in the next step: force [N], torque [N m], world frame; renewed in place.
+        Acting wrench of the next step: force [N], torque [N m], world frame; written in place by `apply`.
     output : (worlds * bodies, 6) float64
-        Wrench that the lag has reached.
+        Wrench w that the lag has reached at the end of the last step [N, N m].
     past : (worlds, bodies, 6) float64 or None
-        Loads that go past the actuator in the next steps: force [N], torque [N m], world frame.
+        Loads that bypass the actuator in the next steps: force [N], torque [N m], world frame.
     """
 
     def __init__(self, actuator: Actuator, shape: tuple[int, int, int]):
@@ -66,7 +69,11 @@ class Actuation:
         return np.zeros((self._shape[0] * self._shape[1], 6))
 
     def advance(self, world: Batch, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Make `World.advance` through the actuator; one with a memory is called at each step."""
+        """Advance a batch by `steps` steps of `dt` [s] under a commanded wrench (worlds, bodies, 6).
+
+        An actuator with lag or delay is applied before each step. One without is applied once, and the kernel makes
+        all steps in one call. `calls` are the kernel's bound calls. The report covers all steps.
+        """
         if steps == 1 or not self.actuator.remembers:
             self.apply(wrench, dt)
             world.make(calls, steps * dt)
@@ -82,7 +89,7 @@ class Actuation:
 
     @contextmanager
     def passed_by(self, load: np.ndarray | None) -> Iterator[None]:
-        """Add a load (worlds, bodies, 6) past the actuator in the steps of the block."""
+        """Add a load (worlds, bodies, 6) [N, N m], behind the actuator, to all steps within the ``with`` block."""
         self.past = load
         try:
             yield
@@ -90,7 +97,7 @@ class Actuation:
             self.past = None
 
     def apply(self, wrench: np.ndarray, dt: float) -> None:
-        """Take the command of a step of `dt` [s]; `applied` is then the acting wrench."""
+        """Pass the commanded wrench (worlds, bodies, 6) of a step of `dt` [s] through the actuator into `applied`."""
         if self.actuator.delay > 0.0:
             self._command = self._nothing()
         self._command[...] = wrench.reshape(-1, 6)
@@ -108,7 +115,10 @@ class Actuation:
             self.applied += self.past
 
     def _treads(self, dt: float) -> list[tuple[float, np.ndarray]]:
-        """Staircase of commands over a step of `dt`: (share of the step, command); zero before the first command."""
+        """Treads of the delayed commands within a step of `dt` [s], in order: share of the step, and command.
+
+        Before the first command arrives the command is zero. Commands that no later step needs are forgotten.
+        """
         if self.actuator.delay == 0.0:
             return [(1.0, self._command)]
         late = [*self._late, (0.0, self._command)]
@@ -120,14 +130,20 @@ class Actuation:
         return [(end - begin, command) for (begin, end), command in zip(pairwise(edges), commands) if end > begin]
 
     def forget(self, worlds: np.ndarray) -> None:
-        """Reset these worlds: no output, no commands on their way."""
+        """Reset the actuators of these worlds (indices): zero output, and zero for all commands not yet arrived."""
         if len(worlds) == self._shape[0]:
             self._late = []
         for rows in (self.output, *(command for _, command in self._late)):
             rows.reshape(self._shape)[worlds] = 0.0
 
     def kept(self, worlds: np.ndarray | None = None) -> tuple:
-        """State of the actuators of some worlds, or of all, for `reinstate` and `reinstate_worlds`."""
+        """Copy the state of the actuators of these worlds (indices; None: all), for the methods `reinstate...`.
+
+        Returns
+        -------
+        tuple
+            Output (k * bodies, 6), and the list of delayed commands, each as (age [s], command (k * bodies, 6)).
+        """
         if worlds is None:
             return self.output.copy(), [(age, command.copy()) for age, command in self._late]
         output, late = self.output, self._late
@@ -136,19 +152,23 @@ class Actuation:
         ]
 
     def reinstate(self, kept: tuple) -> None:
-        """Restore a state from `kept` of all worlds."""
+        """Restore the state of all worlds, as the method `kept` returned it."""
         output, late = kept
         self.output[...] = output
         self._late = [(age, command.copy()) for age, command in late]
 
     def reinstate_worlds(self, kept: tuple, source: np.ndarray, worlds: np.ndarray) -> None:
-        """Restore `worlds` (k,) from the worlds `source` (k,) of a state from `kept`.
+        """Restore the actuators of some worlds from a state that the method `kept` returned.
 
         Parameters
         ----------
         kept : tuple
-        source, worlds : (k,) int64
-            If `worlds` are all there are, nothing of the batch's own commands is left.
+            State, possibly of another batch of the same scene.
+        source : (k,) int64
+            Indices of worlds within `kept`.
+        worlds : (k,) int64
+            Indices of the worlds of this batch that get these states. Other worlds keep their commands; their delayed
+            commands and the restored ones are merged by age.
         """
         output, theirs = kept
         self.output.reshape(self._shape)[worlds] = self._rows(output, source)
@@ -164,17 +184,17 @@ class Actuation:
             self._late.append((age, command))
 
     def _rows(self, table: np.ndarray, worlds: np.ndarray) -> np.ndarray:
-        """Copied rows (k, bodies, 6) of some worlds in a table (worlds * bodies, 6)."""
+        """Copy the rows (k, bodies, 6) of the worlds with these indices from a table (worlds * bodies, 6)."""
         return table.reshape(-1, *self._shape[1:])[worlds]
 
 
 def _held(staircase: list[tuple[float, np.ndarray]], age: float) -> np.ndarray | None:
-    """Youngest command of a staircase that is at least as old as this [s]; None without one."""
+    """Youngest of the commands (age [s], command), oldest first, that is at least `age` old; None if there is none."""
     return next((command for each, command in reversed(staircase) if each >= age), None)
 
 
 def _snapped(share: float) -> float:
-    """Share of a step, set to 0 or 1 where it is so to rounding."""
+    """Round a share of a step to 0 or 1 if it is within `NO_TIME` of it; else return it unchanged."""
     for edge in (0.0, 1.0):
         if abs(share - edge) <= NO_TIME:
             return edge

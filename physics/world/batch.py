@@ -1,4 +1,4 @@
-"""Arrays of a batch of worlds, shared by the parts of a `World`."""
+"""Batch of worlds: the arrays and settings on which all parts of `physics.World` work."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _KEPT, _KEPT_AWAKE = attrgetter(*KEPT), attrgetter(*KEPT[:-1])
 
 
 class ActuatorState(Protocol):
-    """Interface of a batch's actuators; see `physics.world.actuator`."""
+    """Interface of the actuators of a batch, as the step uses it; see `physics.world.actuator.Actuation`."""
 
     actuator: Actuator
     applied: np.ndarray
@@ -37,80 +37,84 @@ class ActuatorState(Protocol):
     past: np.ndarray | None
 
     def passed_by(self, load: np.ndarray | None) -> AbstractContextManager[None]:
-        """Add a load past the actuator in the steps of a block."""
+        """Add a load (worlds, bodies, 6), which bypasses the actuators, to all steps within the ``with`` block."""
 
     def kept(self, worlds: np.ndarray | None = None) -> Any:
-        """Copy all that decides the coming wrenches, of some worlds or all."""
+        """Copy the actuators' state of these worlds (indices; None: all): everything that decides later wrenches."""
 
     def reinstate(self, kept: Any) -> None:
-        """Restore the state when `kept` was taken."""
+        """Restore the state of all worlds from `kept`, as the method `kept` returned it."""
 
     def reinstate_worlds(self, kept: Any, source: np.ndarray, worlds: np.ndarray) -> None:
-        """Restore worlds from those of `source` in `kept`."""
+        """Restore the actuators of `worlds` (k,) from the worlds `source` (k,) of a state `kept`."""
 
     def advance(self, world: Any, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Make steps with the wrench that the actuators let through."""
+        """Advance a batch by `steps` steps of `dt` [s], with the wrench that the actuators make of the command."""
 
     def forget(self, worlds: np.ndarray) -> None:
-        """Drop all commands that these worlds were given."""
+        """Reset the actuators of these worlds (indices): zero output, and no delayed commands."""
 
 
 class Batch(Exclusive):
-    """Many worlds of one scene as arrays.
+    """Many worlds of one scene, as arrays with rows for all of them; base of `World`.
 
     Attributes
     ----------
-    scene, accuracy, plan : Scene, Accuracy, Plan
-        What is simulated, and how.
+    scene : Scene
+        Description of the bodies, walls and effects.
+    accuracy : Accuracy
+        Settings of the simulation.
+    plan : Plan
+        Effects and settings for which the kernels are compiled.
     scene_settings : dict of str to str
         Settings of the scene that no array holds; see `physics.world.scene_settings`.
     worlds, body_count, threads : int
-        Size of the batch, bodies of a world, threads that share a step.
+        Number of worlds of the batch, of bodies of a world, and of threads that share a step.
     names : tuple of str
-        Of the bodies; "" for one without a name.
+        Names of the bodies; "" for a body without a name.
     dt, time : float
-        Step, and time since the start [s].
+        Length of a step, and time since the start [s].
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
-        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+        Read-only views of `state` in the world frame, refreshed in place by every step; copy them to keep them.
     state : (worlds * bodies, STATE_SIZE) float64
-        The array behind them, for kernels that read it; columns in `physics.kernels.state.layout`.
+        States of all bodies, a row for each; columns in `physics.kernels.state.layout`.
     params : (worlds * bodies, PARAM_SIZE + columns of fields and laws) float64
-        Physical parameters; columns likewise.
+        Physical parameters of all bodies, a row for each; columns in `physics.kernels.state.layout`.
     gravity : (worlds, 3) float64
-        [m/s²].
+        Acceleration of gravity in each world [m/s²].
     walls : (walls, WALL_SIZE) float64
         Normal, tangents and offset of each wall.
     shapes : (bodies,) int64
         Codes of the bodies' shapes.
     memory : (worlds * bodies or worlds, columns) float64
-        Contacts and impulses of the last resting stage: the next one's warm start.
+        Contacts and impulses of the last resting stage, the warm start of the next one.
     sleep : (worlds * bodies or 0, SLEEP_SIZE) float64
-        What is known of bodies that may sleep.
+        State of sleep of each body; no rows if bodies do not sleep in the scene.
     report_table : (worlds, REPORT_SIZE) float64
-        The array behind `World.report`.
+        Numbers of the last step's report, which `World.report` reads.
     event_log, event_counts : (worlds * bodies, room, EVENT_SIZE) float64, (worlds * bodies,) int64
-        Events of the last call; see `World.make_event_room`.
+        Events of the last kernel call, and their number for each body; see `World.make_event_room`.
     impacts : KeptImpacts or None
-        Impacts of a step of several calls, where a user asks for them: `World.keep_impacts`.
+        Impacts of the last step, if `World.keep_impacts` asks for them.
     is_plain : bool
-        A call is the kernel alone: no field is told the time, and no impact is kept.
+        Whether a step is the kernel call alone: no field needs the time, and no impacts are kept.
     is_bound : bool
-        A `Stepper` has bound the arrays.
+        Whether a `Stepper` has bound the arrays, so that they must not be replaced.
     actuation : ActuatorState or None
         State of the actuators.
     team : Team
-        The threads.
+        Threads that share the worlds.
     scratch, motions : list
-        Working memory of each thread: of a step, and of the event-driven scheme or of error control.
+        Workspaces of each thread: of a step, and of the event-driven scheme or of error control.
     recorder : StepListener or None
-        What is told of every step; see `physics.Recorder`.
+        Object that is notified of every step; see `physics.Recorder`.
     telling : int or None
-        The thread that tells the recorder of its step.
+        Identifier of the thread that is notifying the recorder now; None if no thread is.
     is_in_use : bool
         Whether a thread is in a method that changes or copies the world. Such a method raises RuntimeError while
         another thread is in one: a world belongs to one thread at a time.
     is_torn : bool
-        Whether another thread was in one when this process was forked.
+        Whether another thread was in such a method when this process was forked.
     """
 
     scene: Scene
@@ -155,7 +159,7 @@ class Batch(Exclusive):
         def _make_event_room(self, room: int) -> None: ...
 
     def make(self, calls: list[BoundCall], duration: float) -> None:
-        """Make the kernel calls of a time [s]."""
+        """Make kernel calls, which advance all worlds by `duration` [s], and add that to the batch's time."""
         if self.is_plain:
             self.team.run(calls)
         else:
@@ -163,7 +167,7 @@ class Batch(Exclusive):
         self.time += duration
 
     def _make_with_more(self, calls: list[BoundCall]) -> None:
-        """Make the calls, and what belongs to them."""
+        """Make kernel calls; tell fields the time before them, and keep the impacts after them."""
         if self.plan.fields:
             self._make_with_fields(calls)
         else:
@@ -172,17 +176,17 @@ class Batch(Exclusive):
             self.impacts.note(self)
 
     def continue_step(self) -> None:
-        """Let the next call go on with the step of the last one: `World.read_impacts` tells the impacts of both."""
+        """Let the next kernel call belong to the step of the last one: `World.read_impacts` then reads both."""
         if self.impacts is not None:
             self.impacts.go_on(self)
 
     def forget_impacts(self, chosen: np.ndarray | slice = slice(None)) -> None:
-        """Forget the impacts of some worlds, whose state is not that of their last step any more."""
+        """Forget the impacts of the `chosen` worlds, after their state was changed from outside."""
         if self.impacts is not None:
             self.impacts.forget(self, chosen)
 
     def _make_with_fields(self, calls: list[BoundCall]) -> None:
-        """Tell fields the time, and make the calls; an exception of a field then names its class."""
+        """Tell fields the time, and make kernel calls; an exception in a user's field is reworded to name its class."""
         for scratch in self.scratch:
             body_records(scratch)["call_start"] = self.time
         try:
@@ -191,21 +195,21 @@ class Batch(Exclusive):
             raise raised(error, self.plan.fields)  # noqa: B904 (it has a cause already)
 
     def no_wrench(self) -> NDArray[np.float64]:
-        """Zeros (worlds, bodies, 6) float64 for wrenches."""
+        """Make an array of zero wrenches (worlds, bodies, 6) float64."""
         return np.zeros((self.worlds, self.body_count, 6))
 
     def kept(self) -> tuple[np.ndarray, ...]:
-        """The arrays themselves that a snapshot copies, in the order of `KEPT`."""
+        """Arrays that a snapshot copies, in the order of `KEPT`: the batch's own, not copies."""
         return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:
-        """Number of a world's rows in each of the `kept` arrays; 0 for an unused array with one row for all worlds."""
+        """Rows of one world in each of the arrays `kept()`; 0 for an unused array, which has one row for all worlds."""
         bodies = self.body_count
         memory = self.plan.scheme.memory.rows_per_world(bodies) if self.plan.contact else 0
         return (bodies, bodies, 1, memory, 1, bodies) if self.plan.sleeping else (bodies, bodies, 1, memory, 1)
 
     def sleep_of_kernel(self) -> Sleep | None:
-        """Sleep record for the step; None if no body may sleep."""
+        """Record with the array and settings of sleep, as kernels take it; None if bodies do not sleep in the scene."""
         if not self.plan.sleeping:
             return None
         effect: Any = self.scene.effect(Sleeping)

@@ -1,4 +1,4 @@
-"""The arrays behind a `World`: whether they find room, and what the scene says in them."""
+"""Arrays of a batch of worlds: check of the memory they need, and their first contents from the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from physics.world.batch import Batch
 
 
 def check_room(worlds: int, bodies: int, plan: Plan) -> None:
-    """Refuse more worlds than this machine's memory holds: a few would otherwise end the process."""
+    """Raise a ValueError for more worlds than this machine's memory holds, before the system ends the process."""
     row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.field_columns)  # the least that a body takes [bytes]
     memory = machine_memory()
     if worlds * bodies * row > memory:
@@ -27,7 +27,7 @@ def check_room(worlds: int, bodies: int, plan: Plan) -> None:
 
 
 def machine_memory() -> int:
-    """Physical memory [bytes]; where the system does not say, an amount that no machine has."""
+    """Physical memory of this machine [bytes]; 2**62 where the system does not tell it."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -35,7 +35,7 @@ def machine_memory() -> int:
 
 
 def fill(world: Batch) -> None:
-    """Write the scene's bodies and effects into the arrays of every world."""
+    """Write the scene's bodies and effects into the state and parameter arrays of all worlds of a batch."""
     scene, plan = world.scene, world.plan
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     state = world.state.reshape(world.worlds, world.body_count, at.STATE_SIZE)

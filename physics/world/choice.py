@@ -1,4 +1,4 @@
-"""Choice of worlds by indices."""
+"""Choice of worlds of a batch, by indices or by a mask."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from physics.summary import shown
 
 
 def world_indices(worlds, count: int, field: str = "worlds", once: bool = True) -> np.ndarray:
-    """Indices (k,) int64 of the chosen worlds of `count`; a mask of so many bools is allowed, too.
+    """Check a user's choice of worlds; return their indices (k,) int64.
 
     Parameters
     ----------
     worlds : (k,) array_like of int, or (count,) of bool
+        Indices of the chosen worlds, or a mask that is True for them.
     count : int
-        Worlds that there are.
+        Number of worlds of the batch.
     field : str
-        Name in messages.
+        Name of the argument in messages.
     once : bool
-        Refuse a world that is named twice.
+        Whether to refuse a world that is named twice.
 
     Raises
     ------
     ValueError
-        They are no such indices.
+        `worlds` is neither a list of valid indices nor a mask, or names a world twice.
     """
     try:
         found = np.asarray(worlds)

@@ -1,4 +1,4 @@
-"""Contacts of a batch of worlds, read through the contact memory of its scheme."""
+"""Contacts of a batch of worlds in the last step, read from the contact memory of its scheme."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from physics.world.batch import Batch
 
 
 def contact_rows(world: Batch) -> int:
-    """Rows that hold the contacts of a world: `ROWS_PER_BODY` for each body, at most as many as there is room for."""
+    """Default number of rows for a world's contacts: `ROWS_PER_BODY` for each body, limited by the contact memory."""
     if not world.plan.contact:
         return 0
     return min(world.plan.scheme.memory.room(world), ROWS_PER_BODY * world.body_count)
@@ -21,17 +21,18 @@ def read_contacts(world: Batch, indices: np.ndarray, rows: int, body: int = EVER
     Parameters
     ----------
     world : Batch
+        Batch of worlds.
     indices : (n,) int64
-        Of worlds.
+        Indices of the worlds to read.
     rows : int
-        Contacts that are shown of each.
+        Rows for each world; a world with more contacts shows the strongest.
     body : int
-        Contacts of this body only, with it as the first body.
+        Index of a body: only its contacts are read, with it as the first body. `EVERY_BODY`: all contacts.
 
     Returns
     -------
     Contacts
-        New arrays.
+        Contacts in new arrays.
     """
     out = no_contacts(len(indices), rows)
     if not world.plan.contact:
@@ -42,20 +43,27 @@ def read_contacts(world: Batch, indices: np.ndarray, rows: int, body: int = EVER
 
 
 def contacts_of_world(world: Batch, index: int) -> Contacts:
-    """Read all contacts of one world: `Contacts` of n = 1 with as many rows as there are."""
+    """Read all contacts of the world `index`: `Contacts` of n = 1 world, with a row for each contact."""
     count = world.plan.scheme.memory.count(world, index) if world.plan.contact else 0
     return read_contacts(world, np.array([index]), count)
 
 
 def write_contact_forces(world: Batch, indices: np.ndarray, out: np.ndarray) -> None:
-    """Sums of the contact forces on bodies in the last step [N], world frame, into `out` (n, bodies, 3)."""
+    """Write the sum of the contact forces on each body in the last step [N], world frame, into `out` (n, bodies, 3).
+
+    The n worlds are `indices`.
+    """
     out[...] = 0.0
     if world.plan.contact:
         world.plan.scheme.memory.add_forces(world, indices, out)
 
 
 def write_contact_impulses(world: Batch, indices: np.ndarray, forces: np.ndarray, out: np.ndarray) -> None:
-    """Sums of the contact impulses on bodies [N s] into `out` (n, bodies, 3), from those of the forces."""
+    """Write the sum of the contact impulses on each body [N s], world frame, into `out` (n, bodies, 3).
+
+    They are the contact `forces` (n, bodies, 3) [N] times the durations of the stages in which these acted. The n
+    worlds are `indices`.
+    """
     out[...] = forces
     if world.plan.contact:
         out *= world.plan.scheme.memory.durations(world, indices)

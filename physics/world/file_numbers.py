@@ -1,4 +1,4 @@
-"""Numbers of a snapshot file, before a kernel reads them."""
+"""Check of the numbers of a snapshot file, before a kernel reads them."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ from physics.world.snapshot import KEPT, Snapshot
 
 
 def check_numbers(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse numbers of a file that no step could have written: kernels take counts and indices from them.
+    """Refuse a snapshot of a file with numbers that no step of this scene could have written.
+
+    Kernels use some of these numbers as counts and indices without a check.
 
     Raises
     ------
     ValueError
-        A state or a parameter is not finite, or the contact memory names contacts that there cannot be.
+        A state or a parameter is not finite, or the contact memory names contacts that cannot exist in the scene.
     """
     parts = dict(zip(KEPT, snapshot.arrays))
     for name in ("state", "params", "gravity"):

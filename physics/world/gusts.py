@@ -1,4 +1,7 @@
-"""Restart gusts in some worlds of a batch, whose time is common, and tell whether a field depends on time."""
+"""Restart of the gusts of some worlds of a batch, although all its worlds share one time.
+
+Also a check whether any field of a plan depends on time.
+"""
 
 from __future__ import annotations
 
@@ -13,33 +16,38 @@ from physics.scene.force_fields import Wind
 from physics.world.batch import Batch
 
 PHASES = 3 * WIND_WAVES
-"""Number of phases of one wind."""
+"""Number of phases that decide the gusts of one `Wind`: one for each of its waves and components."""
 
 
 def reads_time(plan: Plan, params: np.ndarray) -> bool:
-    """True if a field may change with time: wind with gusts, or a user's field that is not declared steady."""
+    """True if a field of a plan may change with time: wind with gusts, or a user's field not declared steady.
+
+    `params` is the parameter table of a batch, which holds the strengths of the gusts.
+    """
     if any(slot.is_users and not all(effect.is_steady for effect in slot.effects) for slot in plan.fields):
         return True
     return any(params[:, first + WIND_GUST].any() for first in _winds(plan))
 
 
 def gust_phases(plan: Plan) -> int:
-    """Number of phases that decide the gusts of one world; 0 if its winds are steady."""
+    """Number of phases that decide the gusts of all winds of one world; 0 if no wind of the plan has gusts."""
     return PHASES * len(_winds(plan)) if any(_has_gusts(slot) for slot in plan.fields) else 0
 
 
 def begin_gusts(world: Batch, worlds: np.ndarray, shares: np.ndarray) -> None:
-    """Restart gusts in some worlds, like those of a batch of their own at time 0.
+    """Restart the gusts of some worlds with given phases, as if their time were 0 now.
 
-    A wave cos(ω t + φ) gets the phase φ - ω t of the present time t. At t = 0 nothing is rounded; later the gusts are
-    the same up to the rounding of ω t.
+    A wave cos(ω t + φ) of the gusts gets the phase φ - ω t₀, where t₀ is the present time of the batch. The gusts are
+    then those of a new batch up to the rounding of ω t₀, and exactly those if t₀ = 0.
 
     Parameters
     ----------
     world : Batch
+        Batch, whose parameters are changed.
     worlds : (k,) int64
-    shares : (k, `gust_phases`) float
-        Of a turn, 0 to 1.
+        Indices of the worlds whose gusts restart.
+    shares : (k, n) float
+        Phases φ as shares of a turn, 0 to 1; n is `gust_phases`.
     """
     params = world.params.reshape(world.worlds, world.body_count, -1)
     turns = 2.0 * math.pi * shares.reshape(len(worlds), -1, 3, WIND_WAVES)
@@ -53,12 +61,12 @@ def begin_gusts(world: Batch, worlds: np.ndarray, shares: np.ndarray) -> None:
 
 
 def _frequencies() -> np.ndarray:
-    """(waves,) ω τ, as of `physics.kernels.forces.wind.gust_frequency`."""
+    """Products ω τ (waves,) of the angular frequencies of a wind's waves and its time scale, as in `gust_frequency`."""
     return np.tan(0.5 * math.pi * (np.arange(WIND_WAVES) + 0.5) / WIND_WAVES)
 
 
 def _winds(plan: Plan) -> list[int]:
-    """First column of each wind in the parameters."""
+    """Index of the first column of each `Wind` of a plan in the parameter table."""
     return [
         at.PARAM_SIZE + slot.first + slot.term.size * k
         for slot in plan.fields

@@ -1,4 +1,4 @@
-"""Files of arrays with a descriptive head: ``.npz`` files that run no code when they are read."""
+"""Files of named arrays with a head, a JSON object that describes them: ``.npz`` files, which never run code."""
 
 from __future__ import annotations
 
@@ -17,21 +17,23 @@ T = TypeVar("T")
 
 
 def head_value(head: Any, name: str, is_right: Callable[[Any], object], allowed: str) -> Any:
-    """Value of a name in a head.
+    """Look up and check a value in the head of a file.
 
     Parameters
     ----------
     head : dict
+        Head as read from the file; other objects are refused.
     name : str
+        Key of the value.
     is_right : callable
-        Whether a value may be there; an exception means that it may not.
+        Takes the value and returns whether it is valid; an exception counts as no.
     allowed : str
-        What may be there, for the error.
+        Description of the valid values, for the error.
 
     Raises
     ------
     ValueError
-        Naming the field, its value and what is allowed.
+        The head lacks the key, or its value is invalid. The message names key, value and `allowed`.
     """
     if not isinstance(head, dict) or name not in head:
         raise ValueError(f"its head has no {name}; allowed is {allowed}")
@@ -45,33 +47,33 @@ def head_value(head: Any, name: str, is_right: Callable[[Any], object], allowed:
 
 
 def is_text(value: Any) -> bool:
-    """True for a text."""
+    """True if the value of a head is a text."""
     return isinstance(value, str)
 
 
 def is_count(value: Any) -> bool:
-    """True for an integer of at least 0."""
+    """True if the value of a head is an integer of at least 0."""
     return isinstance(value, int) and not isinstance(value, bool) and value >= 0
 
 
 @dataclass(frozen=True)
 class FileKind:
-    """A kind of headed file.
+    """Kind of file with a head, such as a snapshot or a recording: it writes and reads files of this kind.
 
     Parameters
     ----------
     kind : str
-        Its name in the head.
+        Name of the kind in the head.
     name : str
-        Its name in errors, such as ``snapshot``.
+        Name of the kind in errors, such as ``snapshot``.
     writer : str
-        Name of the method that writes it, for errors.
+        Name of the method that writes such files, for errors.
     format : int
-        Number of the format that is written; a newer one is refused.
+        Number of the format that is written. Files of a newer format are refused.
     oldest : int
-        Oldest format that is read.
+        Number of the oldest format that is read.
     missing : str
-        What an older one lacks, for errors.
+        Contents that files of older formats lack, in words for errors.
     """
 
     kind: str
@@ -82,27 +84,29 @@ class FileKind:
     missing: str = ""
 
     def write(self, file: BinaryIO, head: Mapping[str, Any], parts: Mapping[str, np.ndarray]) -> None:
-        """Write a JSON-able head and named arrays into an open file."""
+        """Write a head of JSON values, and the named arrays `parts`, into an open binary file."""
         head = {"kind": self.kind, "format": self.format, **head}
         np.savez_compressed(file, head=json.dumps(head), **parts)
 
     def read(
         self, content: BinaryIO, path: str | os.PathLike, make: Callable[[dict[str, Any], dict[str, np.ndarray]], T]
     ) -> T:
-        """Read the content of a file.
+        """Read a file of this kind; return the object that `make` makes of its head and arrays.
 
         Parameters
         ----------
         content : open binary file
+            File to read.
         path : str or Path
-            Its name in an error.
+            Name of the file in an error.
         make : callable
-            Makes the thing of head and arrays; any exception means that the file is no such thing.
+            Takes the head and the dictionary of arrays and returns the object. Any exception of it means that the file
+            is damaged.
 
         Raises
         ------
         ValueError
-            It is of another kind, damaged, or of a format that is not read.
+            The file is of another kind, damaged, or of a format that is not read.
         """
         if not is_zipfile(content):
             raise ValueError(f"{path} is no {self.name}; {self._allowed}")
@@ -115,7 +119,7 @@ class FileKind:
                 raise ValueError(f"it is a {kind}")
             number = head_value(head, "format", lambda value: is_count(value) and value, "an integer of at least 1")
             found = make(head, parts) if self.oldest <= number <= self.format else None
-        except Exception as error:  # whatever is wrong with it, it is none
+        except Exception as error:  # any fault means that the file is not of this kind
             told = f"there is no {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"{path} is no {self.name} ({told}); {self._allowed}") from None
         if found is None:

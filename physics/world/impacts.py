@@ -1,4 +1,4 @@
-"""Impulses of impacts in the last step of a batch of worlds, read from the log of events."""
+"""Impacts and their impulses in the last step of a batch of worlds, read from the log of events."""
 
 from __future__ import annotations
 
@@ -17,36 +17,37 @@ from physics.summary import parts_repr
 from physics.world.batch import Batch
 
 IMPACT_ROOM = 256
-"""Events of a body in one call of a step that there is room for, unless a user asks for more."""
+"""Default number of events for which the log has room, for each body and kernel call."""
 
 
 class Impacts(NamedTuple):
     """Impacts of n worlds in the last step: a row for each pair of bodies, or body and wall, that collided.
 
-    The step is the last call of `World.step` or of a `Stepper`, with all its steps and substeps; in an environment the
-    last control step. Impulses of resting contacts are not among them: `physics.Contacts`. A meeting so slow
-    that a resting stage stops it is part of that stage.
+    The last step is the last call of `World.step` or of a `Stepper`, with all its steps and substeps; in an environment
+    it is the last control step. Impulses of resting contacts are left out: `physics.Contacts` has them. An approach so
+    slow that a resting stage stops it counts as a resting contact.
 
-    A world with more pairs than there are rows shows those with the largest impulses; of equal ones, the first. Pairs
-    are in the order of their first bodies, then of their first impacts. Rows without a pair are zero. Between a
-    reset or a restored snapshot and the next step there are none.
+    A world with more pairs than rows shows the pairs with the largest impulses; of equal ones, the first. Pairs are
+    in the order of their first bodies, then of their first impacts. Rows without a pair are zero. Between a reset or
+    a restored snapshot and the next step there are no impacts.
 
     Attributes
     ----------
     count : (n,) int64
-        Pairs that collided; more than the rows, where some are left out.
+        Pairs that collided; this exceeds the number of rows where some pairs have no row.
     point : (n, rows, 3) float64
-        Mean of the points where the impulses act, weighted by their sizes, world frame [m].
+        Mean of the points of the pair's impacts, weighted by the sizes of their impulses, world frame [m].
     impulse : (n, rows, 3) float64
-        Sum over the impacts of the pair, on the first body, world frame [N s]. The other body gets the opposite.
+        Sum of the impulses of the pair's impacts on the first body, world frame [N s]. The other body gets the
+        opposite impulse.
     hits : (n, rows) int64
-        Impacts of the pair.
+        Number of impacts of the pair.
     ends : (n, rows, 2) int64
-        First body; other body, or -1 - k for wall k.
+        Index of the first body; index of the other body, or -1 - k for wall k.
     total : (n, bodies, 3) float64
-        Sum over all impacts of each body, also of those without a row, world frame [N s].
+        Sum of the impulses of all impacts on each body, those without a row included, world frame [N s].
     left_out : (n,) int64
-        Events for which the log had no room: impulses of these are missing. `World.keep_impacts` takes more room.
+        Events for which the log had no room, and whose impulses are missing. `World.keep_impacts` makes more room.
     """
 
     count: np.ndarray
@@ -68,7 +69,7 @@ class Impacts(NamedTuple):
 
 
 class _Pairs(NamedTuple):
-    """Pairs that collided in one world, in their order."""
+    """Workspace with the pairs that collided in one world, in the order of `Impacts`."""
 
     ends: np.ndarray  # (pairs, 2) int64
     hits: np.ndarray  # (pairs,) int64
@@ -78,26 +79,28 @@ class _Pairs(NamedTuple):
 
 
 class _Log(NamedTuple):
-    """Events of the calls of a step, those of one call behind those of the call before."""
+    """Events of all kernel calls of a step; each body's events of one call follow those of the call before."""
 
     events: np.ndarray  # (worlds * bodies, room of all calls, EVENT_SIZE)
     counts: np.ndarray  # (worlds * bodies, calls) int64, events of each call
     starts: np.ndarray  # (calls,) int64, first row of each call
-    room: int  # of a call
+    room: int  # rows for a body's events in one call
 
 
 class KeptImpacts:
-    """Impacts of a step of one call or several: the log of a world holds those of the last call alone.
+    """Events of all kernel calls of the last step; the log of a batch holds those of the last call only.
 
     Parameters
     ----------
     room : int
-        Events of a body in one call.
+        Events for which the log has room, for each body and call.
+    is_known : bool
+        Initial value of the attribute.
 
     Attributes
     ----------
     is_known : bool
-        The impacts of the last step were kept, or there was none.
+        Whether the impacts of the last step are kept, or no step has been made since the states were set.
     """
 
     def __init__(self, room: int, is_known: bool):
@@ -106,7 +109,7 @@ class KeptImpacts:
         self._earlier: list[tuple[np.ndarray, np.ndarray]] = []  # events and counts of earlier calls of the step
 
     def note(self, world: Batch) -> None:
-        """Note that a call was made; the world's report counts events without room."""
+        """Take note of a kernel call that was just made; events without room are added to the batch's report."""
         if not self._goes_on:
             self._earlier = []
         self.is_known, self._goes_on = True, False
@@ -116,19 +119,19 @@ class KeptImpacts:
             world.report_table[:, at.CONTACTS_LEFT_OUT] += missing
 
     def go_on(self, world: Batch) -> None:
-        """Let the next call go on with the step of the last one."""
+        """Copy the events of the last call, since the next call belongs to the same step."""
         counts = world.event_counts
         self._earlier.append((world.event_log[:, : int(counts.max())].copy(), counts.copy()))
         self._goes_on = True
 
     def forget(self, world: Batch, chosen: np.ndarray | slice) -> None:
-        """Forget the impacts of some worlds: they were put somewhere else."""
+        """Forget the impacts of the `chosen` worlds, whose states were changed from outside."""
         for counts in (world.event_counts, *(counts for _, counts in self._earlier)):
             counts.reshape(world.worlds, -1)[chosen] = 0
         self.is_known = self.is_known or type(chosen) is slice or len(chosen) == world.worlds
 
     def log(self, world: Batch) -> _Log:
-        """Events of all calls of the step."""
+        """Join the events of all calls of the last step."""
         room = world.event_log.shape[1]
         if not self._earlier:
             return _Log(world.event_log, world.event_counts[:, None], np.zeros(1, np.int64), room)
@@ -140,7 +143,10 @@ class KeptImpacts:
 
 @kernel
 def _pair(a, other, first, count, pairs):
-    """Place of a pair in the list, in which those of body a begin at `first`; `count` where it is new."""
+    """Index in `pairs` of the pair of body `a` and `other` (a body, or -1 - wall).
+
+    Pairs of body `a` are at `first` to `count` - 1. A new pair is written at `count`, with zero sums.
+    """
     for k in range(first, count):
         if pairs.ends[k, 1] == other:
             return k
@@ -153,7 +159,7 @@ def _pair(a, other, first, count, pairs):
 
 @kernel
 def _add(i, row, k, events, pairs):
-    """Add an event to pair k: a row of those of body i of the batch."""
+    """Add the impact in row `row` of the events of body `i` of the batch to the sums of pair `k`."""
     size = 0.0
     for c in range(3):
         size += events[i, row, ev.EVENT_IMPULSE + c] * events[i, row, ev.EVENT_IMPULSE + c]
@@ -167,7 +173,10 @@ def _add(i, row, k, events, pairs):
 
 @kernel
 def _collect(n, world, log, pairs, out):
-    """Find the pairs of a world that collided, and the sums of its bodies; return the number of pairs."""
+    """Collect the pairs of a world that collided into `pairs`; return their number.
+
+    The totals of its bodies, and the events without room, go to row `n` of `out`, an `Impacts`.
+    """
     bodies, count = out.total.shape[1], 0
     for a in range(bodies):
         i, first = world * bodies + a, count
@@ -190,7 +199,10 @@ def _collect(n, world, log, pairs, out):
 
 @kernel
 def _read(indices, body, log, pairs, strongest, out):
-    """Impacts of some worlds; a chosen body comes first in its pairs."""
+    """Read the impacts of the worlds `indices` from `log` into `out`, an `Impacts`.
+
+    With a `body` other than `EVERY_BODY` only its pairs are read, with it as their first body.
+    """
     for n in range(indices.shape[0]):
         found, kept = _collect(n, indices[n], log, pairs, out), 0
         for k in range(found):
@@ -210,13 +222,16 @@ def _read(indices, body, log, pairs, strongest, out):
 
 
 def read_impacts(world: Batch, kept: KeptImpacts, indices: np.ndarray, rows: int, body: int = EVERY_BODY) -> Impacts:
-    """Read the impacts of worlds `indices` (n,) int64 in the last step; see `World.read_impacts`."""
+    """Read the impacts of the worlds `indices` (n,) int64 in the last step, of one body or of `EVERY_BODY`.
+
+    `rows` is the number of rows of the result for each world; `World.read_impacts` tells more.
+    """
     n, bodies, log = len(indices), world.body_count, kept.log(world)
     out = Impacts(
         np.zeros(n, np.int64), np.zeros((n, rows, 3)), np.zeros((n, rows, 3)), np.zeros((n, rows), np.int64),
         np.zeros((n, rows, 2), np.int64), np.zeros((n, bodies, 3)), np.zeros(n, np.int64),
     )  # fmt: skip
-    most = int(log.counts.sum())  # of all worlds, so that those of one fit
+    most = int(log.counts.sum())  # events of all worlds, at least as many as pairs in one world
     pairs = _Pairs(
         np.empty((most, 2), np.int64), np.empty(most, np.int64), np.empty((most, 3)), np.empty((most, 3)),
         np.empty(most),

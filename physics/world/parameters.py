@@ -1,4 +1,4 @@
-"""Rows of physical parameters for the kernels, from bodies and from per-world values."""
+"""Table of physical parameters for the kernels, from the bodies of a scene and from values for each world."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from physics.scene.scene import HalfSpace
 
 
 def quaternion_of(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion (w, x, y, z), w >= 0, of a rotation matrix, by the largest of its four components."""
+    """Unit quaternion (w, x, y, z) with w >= 0 of a rotation matrix (3, 3), computed from its largest component."""
     trace = np.trace(R)
     four = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
     largest = int(np.argmax(four))
@@ -43,7 +43,7 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
 
 
 def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
-    """Mass properties and dimensions of a scene's bodies into `params` (worlds * bodies, PARAM_SIZE)."""
+    """Write mass properties and dimensions of a scene's bodies into `params` (worlds * bodies, PARAM_SIZE)."""
     for b, body in enumerate(bodies):
         moments, R = principal_axes(body.inertia)
         _write_body(
@@ -53,7 +53,11 @@ def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
 
 
 def _write_body(rows, body, masses, moments, R, dimensions) -> None:
-    """Write one body into its rows (n, PARAM_SIZE), without the series; the other arrays have n rows, or one."""
+    """Write mass properties and dimensions of one body into its rows (n, PARAM_SIZE), one for each of n worlds.
+
+    Coefficients of the attitude series are left as they are. The arrays `masses` [kg], `moments` [kg m²], `R`
+    (principal to body axes) and `dimensions` [m] have n rows, or one for all worlds.
+    """
     rows[:, at.INV_MASS] = 1.0 / masses
     rows[:, at.INV_INERTIA : at.INV_INERTIA + 3] = 1.0 / moments
     rows[:, at.PRINCIPAL : at.PRINCIPAL + 4] = np.reshape([quaternion_of(frame) for frame in R], (-1, 4))
@@ -62,7 +66,7 @@ def _write_body(rows, body, masses, moments, R, dimensions) -> None:
     rows[:, at.RADIUS] = body.bounding_radius(dimensions) + np.linalg.norm(body.center)  # about the centre of mass
 
 
-# Which effect a law of contact is a number of.
+# Effect, and its attribute, from which the number of each contact law comes.
 LAW_EFFECTS = {
     LAW_TANGENTIAL: (Contact, "tangential"),
     LAW_ROLLING: (RollingFriction, "radius"),
@@ -74,7 +78,7 @@ LAW_EFFECTS = {
 
 
 def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> None:
-    """Numbers of the laws of contact among `effects` into their columns, the last of `params` (n, ...)."""
+    """Write the number of each contact law, found among `effects`, into its column: the last columns of `params`."""
     for k, law in enumerate(laws):
         kind, name = LAW_EFFECTS[law]
         for effect in effects:
@@ -83,14 +87,14 @@ def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> 
 
 
 def _write_series(params: np.ndarray) -> None:
-    """Coefficients of the rotation series into all rows of `params` from their moments."""
+    """Write the coefficients of the attitude series into all rows of `params`, from their moments of inertia."""
     first, series = at.INV_INERTIA, params[:, at.SERIES : at.SERIES + at.SERIES_SIZE]
     write_attitude_series(*params[:, first : first + 3].T, series.T)
 
 
 @entry_kernel
 def _change_series(params):
-    """Write the series, compiled: worlds with their own bodies change them at every reset."""
+    """Write the coefficients of the attitude series as `_write_series` does, compiled, since resets may need it."""
     first = at.INV_INERTIA
     for i in range(params.shape[0]):
         series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]
@@ -98,7 +102,11 @@ def _change_series(params):
 
 
 def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple[int, ...], str]:
-    """Arguments (array, shape, field) for `validation`: `value` with a missing worlds or bodies axis added."""
+    """Broadcast `value` to `shape` (worlds, bodies, ...); the axes of bodies, or of both, may be missing.
+
+    Returns the arguments (array, shape, field) of the functions in `physics.validation`. ValueError if the shapes do
+    not fit.
+    """
     allowed = f"shape {shape}, or without the axis of bodies, or of worlds and bodies"
     array = validation.floats(value, field, f"are numbers in {allowed}")
     given = array.shape
@@ -111,7 +119,28 @@ def spread(value, shape: tuple[int, ...], field: str) -> tuple[np.ndarray, tuple
 
 
 def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> None:
-    """Write new masses, sizes and inertias (each may be None) into `params` ((k * bodies, PARAM_SIZE))."""
+    """Write new masses, sizes and inertia tensors into the parameters of k worlds.
+
+    An argument that is None leaves its numbers unchanged. Without `inertia_body` the inertia follows from mass and
+    size, or is that of the scene's body, scaled with the mass.
+
+    Parameters
+    ----------
+    params : (k * bodies, PARAM_SIZE) float64, changed
+        Rows of the worlds.
+    bodies : tuple of Body
+        Bodies of the scene.
+    plan : Plan
+        Plan of the scene; it decides the inertias that the kernel supports.
+    mass : array_like or None
+        Masses [kg], of `shape`.
+    size : array_like or None
+        Edges, or diameters, [m], of `shape` and three numbers.
+    inertia_body : array_like or None
+        Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers.
+    shape : tuple of int
+        (k, bodies).
+    """
     masses = 1.0 / params[:, at.INV_MASS]
     if mass is not None:
         masses = validation.positive(*spread(mass, shape, "mass")).ravel()
@@ -136,7 +165,11 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
 
 
 def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarray]:
-    """Moments (n, 3) [kg m²] and frames (n, 3, 3), or (1, 3, 3) for all, of one body of the scene in n worlds."""
+    """Principal moments (n, 3) [kg m²] and axes (n, 3, 3), or (1, 3, 3) for all, of one body in n worlds.
+
+    They come from `tensors` (n, 3, 3) if given, else from the body's shape with `masses` (n,) [kg] and half edges or
+    semi-axes `halves` (n, 3) [m].
+    """
     if tensors is not None:
         each = [principal_axes(check_inertia(tensor, "inertia_body")) for tensor in tensors]
         return np.array([moments for moments, _ in each]).reshape(-1, 3), np.array([R for _, R in each]).reshape(
@@ -176,11 +209,11 @@ def _check_allowed(plan, moments, R) -> None:
 
 
 def wall_table(walls: tuple[HalfSpace, ...], along: np.ndarray | None = None) -> np.ndarray:
-    """(walls, WALL_SIZE): normal, two tangents that complete it to a right-handed frame, offset.
+    """Table of walls (walls, WALL_SIZE): unit normal, two tangents that make a right-handed frame with it, offset [m].
 
-    The first tangent is the part along the wall of the directions `along` (walls, 3). Without them it comes from the
-    world axis that follows the one the normal is most along: for a wall normal to a world axis the frame is a
-    permutation of the world's, exactly.
+    The first tangent is the component along the wall of the directions `along` (walls, 3). Without `along` it is that
+    of a world axis: of the axis after the one to which the normal is closest, in the cyclic order x, y, z. So the frame
+    of a wall that is normal to a world axis is exactly a permutation of the world axes.
     """
     table = np.zeros((len(walls), at.WALL_SIZE))
     for k, (row, wall) in enumerate(zip(table, walls)):

@@ -1,4 +1,4 @@
-"""Report of a step, per world. Nothing fails silently."""
+"""Report of a step for each world: residuals, counts, penetration and status, so that no failure stays silent."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from physics.scene.body_names import body_label
 
 
 class Solver(IntEnum):
-    """Strongest contact method that a step needed."""
+    """Strongest method for contact problems that a step needed, as in `StepReport.solver`."""
 
     NONE = at.METHOD_NONE
     DIRECT = at.METHOD_DIRECT
@@ -25,7 +25,7 @@ class Solver(IntEnum):
 
 
 class Status(IntEnum):
-    """Outcome of a world's step."""
+    """Outcome of a world's step, as in `StepReport.status`; `message` explains it."""
 
     OK = 0
     UNRESOLVED = 1
@@ -37,12 +37,12 @@ class Status(IntEnum):
 
     @property
     def message(self) -> str:
-        """Explanation of the status, and advice."""
+        """Explanation of the status in words, and advice."""
         return _MESSAGES[self]
 
     @staticmethod
     def severity(status: int) -> int:
-        """Place of a status in the order of gravity that `StepReport.status` follows; 0: OK."""
+        """Rank of a status by its gravity, 0 for OK; of several, `StepReport.status` shows the one of highest rank."""
         return _GRAVITY.index(status)
 
 
@@ -81,7 +81,7 @@ _GRAVITY = (
     Status.OK, Status.UNRESOLVED, Status.UNCONVERGED, Status.COARSE, Status.OVERLAP, Status.LEFT_OUT, Status.FAULT,
 )  # fmt: skip
 
-# What the kernel below compares with: Numba takes plain integers from a module.
+# Plain integers for the kernel below: Numba reads these from a module, and no enums.
 _UNRESOLVED, _UNCONVERGED, _FAULT = int(Status.UNRESOLVED), int(Status.UNCONVERGED), int(Status.FAULT)
 _LEFT_OUT, _OVERLAP, _COARSE = int(Status.LEFT_OUT), int(Status.OVERLAP), int(Status.COARSE)
 
@@ -107,7 +107,10 @@ def gravest(table, status):
 
 @kernel
 def add_rows(first, end, total, table):
-    """Add the reports of some worlds to those of earlier steps: counts add up, other columns keep the largest."""
+    """Add rows `first` to `end` - 1 of the report `table` of a step to `total`, the report of earlier steps.
+
+    Both are (worlds, REPORT_SIZE). Counts are added; of other columns the larger number stays.
+    """
     for world in range(first, end):
         for c in range(at.REPORT_SIZE):
             if c in (at.PENETRATION, at.RESIDUAL, at.SOLVER, at.OVERLAP, at.FIRST_FAULTY):
@@ -118,33 +121,46 @@ def add_rows(first, end, total, table):
 
 @entry_kernel
 def add_report(total, table):
-    """Add a report `table` (worlds, REPORT_SIZE) to that of earlier steps (`add_rows`)."""
+    """Add the report `table` (worlds, REPORT_SIZE) of a step to `total`, that of earlier steps, as `add_rows` does."""
     add_rows(0, table.shape[0], total, table)
 
 
 class StepReport:
-    """Report of one `World.step`; every property is an array over worlds.
+    """Report of one `World.step`; every property is an array with a number for each world.
 
     Attributes
     ----------
     penetration : (worlds,) float64
-        Worst depth of a contact [m].
+        Largest depth of a contact [m].
     residual : (worlds,) float64
-        Worst natural-map residual accepted, relative to the free contact speed (see
+        Largest residual of a contact problem that was accepted, relative to the free contact speed (see
         `physics.kernels.contact_solver.gauss_seidel`).
-    iterations, solves, fallbacks, unconverged, impacts, unresolved, faults, left_out, coarse : (worlds,) int64
-        Sweeps and Newton steps; contact problems (under error control, those of refused parts, too); of these, by
-        the pivoting fallback (with the scheme ``events`` small leaps of first order, and parts of the shortest length
-        with more than the error tolerance); above the tolerance;
-        impacts that cut a substep; substeps with more impacts than allowed; bodies whose loads or new state were not
-        finite, or beyond 1e100; contacts and near pairs of bodies for which there was no room, and events of a
-        world that keeps impacts (`World.keep_impacts`); bodies that moved in fields which the step does not resolve.
+    iterations : (worlds,) int64
+        Sweeps and Newton steps of the contact solvers.
+    solves : (worlds,) int64
+        Contact problems; under error control those of refused parts of a substep are counted, too.
+    fallbacks : (worlds,) int64
+        Contact problems on which pivoting methods were tried, after others had failed. With the scheme ``events``:
+        small leaps of first order, and parts of the shortest length whose error exceeds the tolerance.
+    unconverged : (worlds,) int64
+        Contact problems with a residual above the tolerance.
+    impacts : (worlds,) int64
+        Impacts that cut a substep.
+    unresolved : (worlds,) int64
+        Substeps with more impacts than `Accuracy.impacts`.
+    faults : (worlds,) int64
+        Bodies whose loads or new state were not finite, or beyond 1e100.
+    left_out : (worlds,) int64
+        Contacts and near pairs of bodies for which there was no room. In a world that keeps impacts
+        (`World.keep_impacts`) also events for which there was no room.
+    coarse : (worlds,) int64
+        Bodies that moved in fields which the step does not resolve.
     overlap : (worlds,) float64
-        Deepest overlap of two bodies that this step began with [m], where they were put into each other by more than a
-        hundredth of the smaller one's bounding radius; else 0.
+        Deepest overlap of two bodies at the start of the step [m], where a user put them into each other by more than
+        a hundredth of the smaller one's bounding radius; else 0.
     fault_body : (worlds,) int64
-        The first body that `faults` counts, of a world that was kept as a whole the first one that it was kept for;
-        -1: none.
+        Index of the first body that `faults` counts; -1: none. Where a fault made a whole world keep its old state,
+        it is the first body with the fault.
     """
 
     __slots__ = ("_names", "_table")
@@ -210,7 +226,7 @@ class StepReport:
 
     @property
     def solver(self) -> NDArray[np.int64]:
-        """(worlds,) int64, values of `Solver`."""
+        """Strongest method that a contact problem of the step needed, (worlds,) int64, values of `Solver`."""
         return self._table[:, at.SOLVER].astype(np.int64)
 
     @property
@@ -222,16 +238,16 @@ class StepReport:
 
     @property
     def ok(self) -> bool:
-        """True if every step can be trusted to its tolerance; `Status.UNRESOLVED` alone does not count against it.
+        """True if the results of all worlds can be trusted to the tolerance.
 
-        Contact problems met their tolerances and were whole, states stayed finite, fields were resolved, and no body
-        was put deep into another.
+        All contact problems met their tolerances, no contact was left out, states stayed finite, fields were resolved,
+        and no body was put deep into another. Worlds with `Status.UNRESOLVED` alone are accepted.
         """
         return not (self._table[:, at.UNCONVERGED : at.FAULTS + 1].any() or self._table[:, at.CONTACTS_LEFT_OUT].any()
                     or self._table[:, at.OVERLAP].any() or self._table[:, at.UNRESOLVED_MOTION].any())  # fmt: skip
 
     def messages(self) -> dict[int, str]:
-        """World index -> message, for the worlds whose status is not OK."""
+        """Messages for the worlds whose status is not OK, by the index of the world."""
         status, told = self.status, {}
         for w in np.flatnonzero(status).tolist():
             told[w] = Status(int(status[w])).message

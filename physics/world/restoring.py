@@ -1,4 +1,4 @@
-"""Take snapshots of a batch, and restore worlds from them, into other worlds and batches of other sizes, too."""
+"""Snapshots of a batch: taking them, and restoring worlds from them, also into other worlds and other batches."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from physics.world.snapshot import KEPT, Snapshot
 
 
 class Targets(NamedTuple):
-    """Worlds to restore, and their sources in a snapshot."""
+    """Worlds of a batch to restore, and for each the world of a snapshot from which it gets its state."""
 
     worlds: np.ndarray | None  # (k,) indices into the batch; None: all
     source: np.ndarray | None  # (k,) indices into the snapshot; None: its one world, or its worlds in their order
@@ -28,7 +28,10 @@ class Targets(NamedTuple):
 
 
 def capture(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
-    """`World.snapshot`, which documents it."""
+    """Take a snapshot of the chosen `worlds` of a batch (None: all) into `out`, or into new arrays.
+
+    `World.snapshot` documents arguments and errors.
+    """
     chosen = None if worlds is None else choice.world_indices(worlds, world.worlds)
     kept, rows = world.kept(), world.kept_rows()
     actuation = None if world.actuation is None else world.actuation.kept(chosen)
@@ -51,7 +54,7 @@ def capture(world: Batch, worlds, out: Snapshot | None) -> Snapshot:
 
 
 def find_targets(world: Batch, snapshot: Snapshot, worlds, source) -> Targets:
-    """Check the arguments of `World.restore`, which documents them; return the targets."""
+    """Check the arguments of `World.restore`, which documents them; return the worlds to restore and their sources."""
     validation.instance(snapshot, Snapshot, "snapshot", "a physics.Snapshot, as `World.snapshot` gives it")
     is_own = snapshot.scene is world.scene_settings
     if not is_own:
@@ -82,7 +85,7 @@ def find_targets(world: Batch, snapshot: Snapshot, worlds, source) -> Targets:
 
 
 def reinstate(world: Batch, snapshot: Snapshot, targets: Targets) -> None:
-    """Restore worlds from a snapshot; arguments as checked by `find_targets`."""
+    """Restore the target worlds of a batch from a snapshot; `targets` come from `find_targets`."""
     chosen, source, is_all = targets
     if not is_all and snapshot.time != world.time:
         _check_clock(world, snapshot)
@@ -104,14 +107,14 @@ def reinstate(world: Batch, snapshot: Snapshot, targets: Targets) -> None:
 
 
 def remember(world: Batch) -> Undo:
-    """Copy a batch; to put it back is to restore it."""
+    """Copy the whole state of a batch; return a function that restores it."""
     before = capture(world, None, None)
     return lambda: reinstate(world, before, Targets(None, None, True))
 
 
 def _reinstate_actuation(world: Batch, snapshot: Snapshot, targets: Targets) -> None:
     chosen = np.arange(world.worlds) if targets.worlds is None else targets.worlds
-    if snapshot.actuation is None:  # of a world without an actuator: there is nothing to go on with
+    if snapshot.actuation is None:  # the snapshot is of a world without an actuator
         world.actuation.forget(chosen)
         return
     source = np.arange(snapshot.worlds) if targets.source is None else targets.source
@@ -120,7 +123,7 @@ def _reinstate_actuation(world: Batch, snapshot: Snapshot, targets: Targets) -> 
 
 
 def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool) -> None:
-    """Copy one of the kept arrays, of all its worlds."""
+    """Copy one array between a batch and a snapshot, for all worlds; `is_memory` marks the contact memory."""
     if is_memory and world.plan.contact:
         world.plan.scheme.memory.copy(source, target)
     else:
@@ -128,17 +131,17 @@ def _copy(world: Batch, source: np.ndarray, target: np.ndarray, is_memory: bool)
 
 
 def _by_world(array: np.ndarray, rows: int, worlds: int) -> np.ndarray:
-    """View (worlds, numbers of one) of an array with so many rows per world."""
+    """View an array with `rows` rows for each world as one row (worlds, rows * columns) for each world."""
     return array.reshape(worlds, rows * array.shape[-1])
 
 
 def _is_alike(world: Batch, snapshot: Snapshot) -> bool:
-    """True for a snapshot of so many worlds of an equal scene."""
+    """True if a snapshot's arrays have the shapes of this batch: as many worlds of an equal scene."""
     return _fits(world, snapshot, world.worlds)
 
 
 def _fits(world: Batch, snapshot: Snapshot, count: int) -> bool:
-    """True if the arrays of a snapshot are those of so many worlds of this scene."""
+    """True if the arrays of a snapshot have the types and shapes of `count` worlds of this batch's scene."""
     kept, arrays = world.kept(), snapshot.arrays
     if len(arrays) != len(kept):
         return False
@@ -158,7 +161,7 @@ def _fits_actuation(actuation: tuple | None, rows: int) -> bool:
 
 
 def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
-    """Number of worlds in a snapshot of this scene, for a restoration of `count` worlds."""
+    """Number of worlds in a snapshot; ValueError if its arrays do not fit the scene. `count` is for the message."""
     if any(getattr(value, "dtype", None) != np.float64 for value in snapshot.arrays):
         raise ValueError(f"snapshot is {snapshot!r}; allowed are arrays of 64-bit numbers, as they were taken")
     held = snapshot.worlds if len(snapshot.arrays) == len(world.kept()) else 0
@@ -168,7 +171,7 @@ def _world_count(world: Batch, snapshot: Snapshot, count: int) -> int:
 
 
 def _check_scene(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse a snapshot of a scene with other settings outside the arrays."""
+    """Raise a ValueError if a snapshot's scene differs from this one in settings that no array holds."""
     other = None if snapshot.scene is None else other_setting(world.scene_settings, snapshot.scene)
     if other is not None:
         name, ours, theirs = other
@@ -179,7 +182,7 @@ def _check_scene(world: Batch, snapshot: Snapshot) -> None:
 
 
 def _check_inertia(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse bodies that the kernel of this scene cannot turn, since it lacks parts of the rotation."""
+    """Raise a ValueError if a snapshot's bodies need parts of the rotation for which the kernel is not compiled."""
     plan, rows = world.plan, snapshot.arrays[KEPT.index("params")]
     is_odd = not plan.gyroscopic and not is_isotropic(1.0 / rows[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()
     if not plan.offset_frame:
@@ -201,7 +204,10 @@ def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:
 
 
 def _check_clock(world: Batch, snapshot: Snapshot) -> None:
-    """Refuse to restore some worlds to another time if a field depends on time: a batch has one time."""
+    """Raise a ValueError if a field depends on time, as worlds of one batch cannot have different times.
+
+    It is called when only some worlds are restored, from a snapshot of another time.
+    """
     if reads_time(world.plan, world.params) or reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
         raise ValueError(
             f"snapshot is of time {snapshot.time!r} s, and the batch of time {world.time!r} s, in a scene with a field "

@@ -1,4 +1,4 @@
-"""Undo a step that ends in an exception of a user's field."""
+"""Rollback of a step that ended in an exception of a user's field."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from physics.world.batch import Batch
 
 
 def remember(world: Batch) -> Undo:
-    """Copy all that decides how a world goes on, before a step that may end in an exception (`Plan.may_raise`).
+    """Copy the state of a batch before a step that may raise an exception; return a function that restores it.
 
-    By then the kernel has advanced some worlds of the batch, and not the others.
+    An exception stops the kernel after it has advanced some worlds of the batch, and not the others. `Plan.may_raise`
+    tells whether a step may raise one.
     """
     time, arrays = world.time, [array.copy() for array in world.kept()]
     actuation = None if world.actuation is None else world.actuation.kept()

@@ -21,7 +21,7 @@ from physics.world.rollout_course import Room, run_wrenches
 from physics.world.snapshot import Snapshot
 from physics.world.world import World
 
-# Columns of a state that can be kept, and how many numbers each has.
+# Columns of a state that a rollout can keep, and the count of numbers of each.
 SIZES = {"pos": 3, "quat": 4, "linvel": 3, "angvel": 3}
 COLUMNS = tuple(SIZES)
 
@@ -30,18 +30,18 @@ MEBIBYTE = 2**20
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """States of a batch along a rollout, `samples` of them.
+    """States of all worlds of a batch at several times, `samples` of them, as `rollout` returns them.
 
     Attributes
     ----------
     pos, quat, linvel, angvel : (worlds, samples, bodies, 3|4|3|3) float64 or None
-        World frame [m, 1, m/s, rad/s]; None: the column was not among those chosen.
+        States in the world frame [m, 1, m/s, rad/s]; None: the argument `columns` did not name this column.
     times : (samples,) float64
         Time of each state [s].
     report_table : (worlds, REPORT_SIZE) float64
-        The array behind `report`.
+        Numbers of the report of all steps, which `report` reads.
     names : tuple of str
-        Of the bodies.
+        Names of the bodies; "" for a body without a name.
     """
 
     pos: np.ndarray | None
@@ -54,22 +54,22 @@ class Rollout:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of the columns that are kept."""
+        """Names of the columns that the rollout kept, such as ``pos``."""
         return tuple(name for name in COLUMNS if getattr(self, name) is not None)
 
     @property
     def report(self) -> StepReport:
-        """Report of all steps together."""
+        """Report of all steps of the rollout together."""
         return StepReport(self.report_table, self.names)
 
     @property
     def status(self) -> np.ndarray:
-        """Gravest outcome of any step, (worlds,) int64, values of `Status`."""
+        """Gravest outcome of all steps of each world, (worlds,) int64, values of `Status`."""
         return self.report.status
 
     @property
     def nbytes(self) -> int:
-        """Memory of the arrays [bytes]."""
+        """Size of all arrays in memory [bytes]."""
         arrays = (*(getattr(self, name) for name in self.columns), self.times, self.report_table)
         return sum(array.nbytes for array in arrays)
 
@@ -101,47 +101,49 @@ def rollout(
 ) -> Rollout:
     """Step every world with its own sequence of wrenches, and keep the states.
 
-    The same bits as `World.step` with one wrench after another. The loop over time runs in each thread, over a few
-    worlds at a time. Afterwards the world is where the last step left it, report and time included.
+    The results have the same bits as those of `World.step` with one wrench after another. The loop over time runs in
+    each thread, over a few worlds at a time. Afterwards the world is in the state of the last step, report and time
+    included.
 
     Parameters
     ----------
     world : World
+        Batch of worlds to step.
     wrenches : (worlds, length, bodies, 6) array_like
-        Force [N] and torque about the centre of mass [N m], world frame; each is held over its steps. With an actuator:
-        commands. Of a scene of one body also (worlds, length, 6).
+        Force [N] and torque about the centre of mass [N m], world frame, for each of `length` intervals. A wrench acts
+        over `steps` steps. With an actuator the wrenches are its commands. With one body also (worlds, length, 6).
     initial : Snapshot, optional
-        Where all worlds begin: a snapshot of one world for all of them, or of as many. None: where they are.
+        Start of the rollout: a snapshot of one world, for all worlds, or of as many worlds. None: the present state.
     steps : int
         Steps with each wrench.
     dt : float, optional
-        Time of a step, instead of the world's [s].
+        Length of a step [s]; None: that of the world.
     columns : sequence of str
-        Columns to keep, of ``pos``, ``quat``, ``linvel``, ``angvel``.
+        Columns of the states to keep, out of ``pos``, ``quat``, ``linvel``, ``angvel``.
     every : int
-        Wrenches from one state that is kept to the next; a divisor of their number, which itself keeps the last state
-        only.
+        A state is kept after every so many wrenches; a divisor of `length`. With ``every=length`` only the last state
+        is kept.
     out : Rollout, optional
-        One of the same sizes and columns, to be overwritten and returned.
+        Rollout of the same sizes and columns, which is overwritten and returned.
 
     Returns
     -------
     Rollout
-        Its arrays take 8 bytes a number: worlds * length / every * bodies * 13 numbers where all columns are kept.
-        Wrenches that are not contiguous float64 are copied. Everything else is small.
+        States of all worlds. With all columns its arrays have worlds * length / every * bodies * 13 numbers of 8
+        bytes. Wrenches that are not contiguous float64 are copied. Everything else is small.
 
     Raises
     ------
     ValueError
-        An argument of the wrong shape or out of range, or more states than this machine's memory holds. Nothing has
-        moved then.
+        An argument of the wrong shape or out of range, or more states than this machine's memory holds. The world is
+        unchanged then.
     RuntimeError
         Another thread is stepping or changing this world.
 
     Notes
     -----
-    With a recorder, an actuator with a delay, or one with a lag and `steps` above 1, each step is made from Python.
-    Where a field of your own raises an exception, the world is put back to where it was before the call.
+    Each step is a call from Python if the world has a recorder or an actuator with a delay, or an actuator with a lag
+    and `steps` above 1. Where a user's field raises an exception, the world returns to its state before the call.
 
     Examples
     --------
@@ -175,7 +177,7 @@ def _rollout(world: World, wrenches, initial, steps, dt, columns, every, out) ->
 
 
 def _wrenches(world: World, wrenches: ArrayLike) -> np.ndarray:
-    """`wrenches` as contiguous float64 (worlds, length, bodies, 6), all finite."""
+    """Check `wrenches`, which must be finite; return them as contiguous float64 (worlds, length, bodies, 6)."""
     worlds, bodies = world.worlds, world.body_count
     allowed = f"({worlds}, length, {bodies}, 6)" + (f" or ({worlds}, length, 6)" if bodies == 1 else "")
     array = validation.floats(wrenches, "wrenches", f"are numbers in shape {allowed}")
@@ -187,7 +189,7 @@ def _wrenches(world: World, wrenches: ArrayLike) -> np.ndarray:
 
 
 def _columns(columns: Sequence[str]) -> list[str]:
-    """Names of the columns to keep, each once."""
+    """Check the names of the columns to keep, each at most once; return them as a list."""
     names = list(columns) if isinstance(columns, Iterable) and not isinstance(columns, str) else [columns]
     for name in names:
         validation.one_of(name, COLUMNS, "columns", " and lists of these")
@@ -197,7 +199,7 @@ def _columns(columns: Sequence[str]) -> list[str]:
 
 
 def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
-    """Arrays for the states; refused where this machine's memory is too small."""
+    """Make a rollout with empty arrays of these shapes; ValueError where this machine's memory is too small."""
     samples = next(iter(shapes.values()))[1]
     needed = 8 * (sum(int(np.prod(shape, dtype=object)) for shape in shapes.values()) + samples)
     memory = batch_arrays.machine_memory()
@@ -216,7 +218,7 @@ def _room(world: World, shapes: dict[str, tuple[int, ...]]) -> Rollout:
 
 
 def _checked(out: Rollout, names: tuple[str, ...], shapes: dict[str, tuple[int, ...]]) -> Rollout:
-    """Check `out`: it must have exactly these arrays, and these names of bodies."""
+    """Return the user's rollout `out`; ValueError unless it has arrays of these shapes and these names of bodies."""
     validation.instance(out, Rollout, "out", "None or a physics.Rollout")
     arrays = {name: getattr(out, name) for name in out.columns}
     is_ours = all(array.flags.c_contiguous and array.flags.writeable for array in arrays.values())

@@ -1,4 +1,4 @@
-"""The steps of a rollout: in machine code, or one by one if Python has something to do between them."""
+"""Steps of a rollout: all in machine code, or one after another from Python if it has to act between them."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ NOTHING = np.zeros((0, 0, 0, 0))
 
 
 class Room(NamedTuple):
-    """Arrays that a rollout is written into."""
+    """Arrays into which a rollout is written."""
 
-    columns: dict[str, np.ndarray]  # (worlds, samples, bodies, 3|4|3|3) of those to keep, by name as in `Samples`
+    columns: dict[str, np.ndarray]  # states to keep by name, as `pos`: (worlds, samples, bodies, 3|4|3|3)
     times: np.ndarray  # (samples,) [s]
     report_table: np.ndarray  # (worlds, REPORT_SIZE)
 
@@ -28,7 +28,7 @@ class Room(NamedTuple):
 def run_wrenches(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt: float, every: int) -> None:
     """Take `steps` steps of `dt` [s] with each of the wrenches (worlds, length, bodies, 6), and keep states.
 
-    Every `every` wrenches they go to `into`.
+    After every `every` wrenches the states of all worlds are written into `into`, which also gets times and report.
     """
     into.report_table[...] = 0.0
     if world.recorder is not None or _needs_python(world, steps):
@@ -38,7 +38,7 @@ def run_wrenches(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt:
 
 
 def _needs_python(world: Batch, steps: int) -> bool:
-    """True if Python has to call the actuator between two steps."""
+    """True if the actuator must be called from Python between two of the steps: with a delay, or `takes_each_step`."""
     if world.actuation is None:
         return False
     return world.actuation.actuator.delay > 0.0 or (steps > 1 and takes_each_step(world))
@@ -71,7 +71,7 @@ def _all_at_once(world: Batch, wrenches, into: Room, steps: int, dt: float, ever
 
 
 def _follow(world: Batch, dt: float) -> Follow | None:
-    """Numbers of the actuator for each step; None without an actuator."""
+    """Numbers with which the kernel applies the actuator before each step of `dt` [s]; None without an actuator."""
     if world.actuation is None:
         return None
     actuator, gone, kept = world.actuation.actuator, 1.0, 0.0

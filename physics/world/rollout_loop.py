@@ -1,8 +1,8 @@
 """Loop over time of a rollout in each thread: all steps of one block of worlds, then the next block.
 
 Worlds are independent, so that no thread waits for another one between two steps, and a block of worlds stays in the
-cache of its processor. `fused` has the whole loop in machine code, which makes prepared calls by their address. The
-other compilers make them from Python, once for each step and block.
+cache of its processor. With the compiler `fused` the whole loop is machine code, which makes prepared calls by their
+address. With the other compilers Python makes these calls, once for each step and block.
 """
 
 from __future__ import annotations
@@ -20,24 +20,27 @@ from physics.scene.field_errors import raised
 from physics.world.batch import Batch
 from physics.world.stepper import kernel_calls
 
-# Worlds that a thread steps through all of time before the next ones: few enough for the cache of a processor, and
-# enough that the calls are a small part of the step.
+# Worlds of a block, which a thread steps through all of time before the next block: few enough for the cache of a
+# processor, and so many that the calls are a small part of the time.
 BLOCK_STEPS = 8
 
-# `moment`, of one thread: the first of the worlds that are stepped, their end, and which step it is.
+# Entries of `moment`, the present place of a thread in its loop: first world of the block, end of the block, and index
+# of the step.
 FIRST, END, STEP, MOMENT_SIZE = range(4)
 
 
 @loop_kernel
 def roll_out(outer, inner, block, starts, clock, moment, calls, count):
-    """Take all steps of the worlds that no other thread has taken, a block at a time.
+    """Make all steps of the worlds that no other thread has taken, block by block; body of a thread's loop.
 
-    A call that raises an exception ends it.
+    It ends early if a call raises an exception.
 
     Parameters
     ----------
-    outer, inner : WorkQueue
-        Of this thread among the others, and of the step kernel, which is given one block.
+    outer : WorkQueue
+        Queue from which this thread takes worlds, which it shares with the other threads.
+    inner : WorkQueue
+        Queue of the step kernel, which this loop fills with one block at a time.
     block : int
         Worlds of a block.
     starts : (length,) float64
@@ -45,9 +48,9 @@ def roll_out(outer, inner, block, starts, clock, moment, calls, count):
     clock : (records,) float64, out
         Time that the fields of this thread read [s]; (0,) without fields.
     moment : (MOMENT_SIZE,) int64, out
-        Where it is: what the calls besides that of the step kernel read.
+        Present block and step, for the calls before and after the step kernel.
     calls, count
-        Calls of one step: what `BoundCall.handed` gives.
+        Calls of one step and their number, from `BoundCall.handed`.
     """
     begin_taking(outer.turns, outer.taken)
     while True:
@@ -70,25 +73,26 @@ def roll_out(outer, inner, block, starts, clock, moment, calls, count):
 
 
 class RolloutLoop:
-    """Loop over time of a world, prepared once and run often.
+    """Loop over time of a batch of worlds, prepared once and run often.
 
     Parameters
     ----------
     world : Batch
-        Its actuator must need no call between two steps; while the loop runs it has no recorder.
+        Batch without a recorder, whose actuator, if any, needs no call from Python between two steps.
     wrench : (worlds, bodies, 6) float64
-        Wrenches of the coming step; with an actuator, its output. A call before each step writes them.
+        Array of the wrenches of the next step [N, N m], which a call before each step writes. With an actuator the
+        kernel reads the actuator's output instead.
     steps : int
-        Steps that are taken at once.
+        Steps that one call of the step kernel makes.
     dt : float
-        Of each [s].
+        Length of each step [s].
 
     Attributes
     ----------
     moments : list of (MOMENT_SIZE,) int64
-        Of each thread: where it is.
+        Present block and step of each thread.
     taken : list of array
-        Of each thread: the worlds that its last step took.
+        Worlds that the last kernel call of each thread stepped, as a list of `work_stealing`.
     """
 
     def __init__(self, world: Batch, wrench: np.ndarray, steps: int, dt: float):
@@ -101,23 +105,24 @@ class RolloutLoop:
         self.taken = [queue.taken for queue in self._inner]
 
     def run(self, length: int, before: list[BoundCall], after: list[BoundCall]) -> np.ndarray:
-        """Step every world `length` times.
+        """Call the step kernel `length` times for every world, with further calls before and after.
 
         Parameters
         ----------
         length : int
+            Number of kernel calls for each world.
         before, after : list of BoundCall
-            What each thread does before a step, and after it.
+            For each thread the call that it makes before the kernel, and the one after it.
 
         Returns
         -------
         (length,) float64
-            Time after each step [s].
+            Time after each kernel call [s].
 
         Raises
         ------
         Exception
-            What a field of the user's raises; worlds are then somewhere on their way.
+            Exception of a user's field. Some worlds have then made more steps than others.
         """
         world = self._world
         times = np.full(1 + length, self._duration)
@@ -145,7 +150,7 @@ def _raise_again(error: Exception, world: Batch) -> NoReturn:
 
 
 def _clock(world: Batch, k: int) -> np.ndarray:
-    """Time that the fields of a thread read, (records,) [s]."""
+    """View (records,) of the time [s] that the fields of thread `k` read; (0,) without fields."""
     return np.atleast_1d(body_records(world.scratch[k])["call_start"]) if world.plan.fields else np.zeros(0)
 
 

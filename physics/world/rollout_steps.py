@@ -1,4 +1,4 @@
-"""Parts of a rollout before each step of a block of worlds, and after it."""
+"""Kernels of a rollout that run before and after each step of a block of worlds: wrenches, states and reports."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from physics.world.rollout_loop import END, FIRST, STEP
 
 
 class Follow(NamedTuple):
-    """Numbers of an actuator without delay, for one step."""
+    """Numbers with which an actuator without delay follows its command over one step."""
 
     limit_force: float  # [N], inf where there is none
     limit_torque: float  # [N m]
-    gone: float  # share of the way to the command that its output goes
-    kept: float  # share that is left in the mean
+    gone: float  # share of the way to the command that the output goes in a step
+    kept: float  # share of the way that is left, as a mean over the step
     command: np.ndarray  # (rows, 6) scratch
     output: np.ndarray  # (rows, 6) wrench that its lag has reached
 
 
 class Course(NamedTuple):
-    """Loads of a rollout, and the arrays from which a step reads them."""
+    """Wrenches of a rollout, and the array in which the step kernel finds that of the next step."""
 
     wrenches: np.ndarray  # (worlds, length, bodies, 6) force [N], torque [N m]
     held: np.ndarray  # (rows, 6) wrench of the next step
-    follow: Follow | None
+    follow: Follow | None  # None without an actuator
 
 
 class Samples(NamedTuple):
-    """Kept states, (worlds, samples, bodies, k) each; (0, 0, 0, 0) for a column that is not kept."""
+    """States that a rollout keeps, (worlds, samples, bodies, 3|4) each; (0, 0, 0, 0) for a column that is not kept."""
 
     pos: np.ndarray
     quat: np.ndarray
@@ -52,7 +52,7 @@ def _keep(first, end, place, column, state, kept):
 
 @kernel
 def _follow(rows, follow, held):
-    """Replace the held wrench by the actuator's response to it."""
+    """Replace the commanded wrenches in these rows of `held` by the actuator's mean response over the step."""
     if follow is not None:
         command, output, applied = follow.command[rows], follow.output[rows], held[rows]
         for i in range(command.shape[0]):
@@ -64,7 +64,7 @@ def _follow(rows, follow, held):
 
 @kernel
 def begin_moment(moment, course):
-    """Hold the wrenches of a step."""
+    """Write the wrenches of the present step of a block into `course.held`, through the actuator if there is one."""
     first, end, k = moment[FIRST], moment[END], moment[STEP]
     count = course.wrenches.shape[2]
     for world in range(first, end):
@@ -76,18 +76,22 @@ def begin_moment(moment, course):
 
 @kernel
 def end_moment(moment, every, state, report, total, samples):
-    """Add up reports of a step, and keep states after each `every` steps.
+    """Add the reports of a step of a block to `total`, and after every `every` steps keep the states in `samples`.
 
     Parameters
     ----------
     moment : (MOMENT_SIZE,) int64
-        Of `physics.world.rollout_loop`.
+        Present block and step, as in `physics.world.rollout_loop`.
     every : int
-        Steps from one state that is kept to the next.
-    state, report : arrays of the world
-    total : (worlds, REPORT_SIZE) float64
+        Steps from one kept state to the next.
+    state : (worlds * bodies, STATE_SIZE) float64
+        States of the batch.
+    report : (worlds, REPORT_SIZE) float64
+        Reports of the step.
+    total : (worlds, REPORT_SIZE) float64, changed
         Report of all steps, zero at first.
-    samples : Samples
+    samples : Samples, out
+        Arrays of kept states.
     """
     first, end, k = moment[FIRST], moment[END], moment[STEP]
     add_rows(first, end, total, report)

@@ -1,4 +1,4 @@
-"""Settings of a scene outside the arrays of a world; they must agree where a state is restored."""
+"""Settings of a scene that no array of a world holds. A snapshot is restored only into a scene with equal settings."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from physics.scene.force_field import Field
 from physics.scene.scene import Scene
 
 NUMBERS_IN_PLAN = (Actuator, Sleeping)
-"""Effects whose numbers are part of the plan, not parameters of a world."""
+"""Effects whose numbers are the same for all worlds, since the plan holds them and not the arrays of a world."""
 
 
 def scene_settings(scene: Scene) -> dict[str, str]:
-    """Settings of a scene by name, as text that can be compared, shown and kept in a file.
+    """Settings of a scene by name (bodies, walls, effects), as text to be compared, shown and stored in a file.
 
-    They exclude sizes, masses, inertias and the numbers of most effects, which are parameters of each world.
+    Sizes, masses, inertias and the numbers of most effects are not among them: each world has its own.
     """
     return {
         "bodies": ", ".join(map(_body, scene.bodies)),
@@ -27,7 +27,10 @@ def scene_settings(scene: Scene) -> dict[str, str]:
 
 
 def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[str, Any, Any] | None:
-    """Name of the first setting that differs, with both values (None: unknown); None if all agree."""
+    """Find the first setting that differs between two scenes: return its name and both values, or None if all agree.
+
+    A value is None where a scene lacks the setting.
+    """
     for name in (*ours, *theirs):
         if ours.get(name) != theirs.get(name):
             return name, ours.get(name), theirs.get(name)
@@ -35,12 +38,12 @@ def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[s
 
 
 def _body(body) -> str:
-    """Kind of a body, and a checksum of the corners of a hull."""
+    """Text for a body: its kind, and for a hull a checksum of its corners."""
     return f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
 
 
 def _effect(effect) -> str:
-    """Name of an effect, with its settings that decide the choice of kernel."""
+    """Text for an effect: its name, and its settings that are the same in all worlds."""
     if isinstance(effect, NUMBERS_IN_PLAN):
         return repr(effect)
     if isinstance(effect, Contact):
@@ -51,6 +54,6 @@ def _effect(effect) -> str:
 
 
 def _switches(contact: Contact) -> list[str]:
-    """Switches of a contact, without its numbers."""
+    """Names of the declared parts of a `Contact`, without their numbers, such as ``restitution``."""
     named = [name for name in ("restitution", "tangential", "stiffness") if getattr(contact, name) is not None]
     return named + ["walls alone"] * (not contact.between_bodies)

@@ -1,4 +1,4 @@
-"""Changes to a running world from outside: checked first, then written, all or nothing."""
+"""Changes of states and parameters of worlds by a user: all values are checked first, then all are written."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from physics.world import choice, parameters
 from physics.world.batch import Batch
 from physics.world.wall_distance import geometric_centres, wall_gaps
 
-# A body may be put this deep into a wall, in bounding radii: what a rounded or hand-typed pose may be off by.
+# Largest depth in a wall, in bounding radii, at which a body may be put: the error of a rounded or hand-typed pose.
 START_DEPTH = 1e-2
 
-# And so deep into one that gives, where depth is what carries it: its centre of mass stays outside.
+# The same for a wall with springs, which carry a body by its depth: the centre of mass stays outside.
 SOFT_DEPTH = 1.0
 
-# Centres of two bodies are in the same place within this share of the smaller bounding radius: rounding.
+# The centres of two bodies count as equal within this share of the smaller bounding radius, which allows for rounding.
 SAME_PLACE = 1e-12
 
-# A direction along which bodies are compared.
+# Direction along which bodies are sorted to find equal centres; scenes hardly ever use it.
 SKEW = np.array([0.5257311121191336, 0.3090169943749474, 0.7925309171246312])
 
 
 def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
-    """`World.set_state`, which documents it."""
+    """Set the state of bodies in some worlds; `World.set_state` documents arguments and errors."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
     state = _new_state(world, chosen, rows, pos, quat, linvel, angvel)
@@ -43,7 +43,7 @@ def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
 
 
 def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
-    """`World.set_parameters`, which documents it."""
+    """Set physical parameters of some worlds; `World.set_parameters` documents arguments and errors."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
     params = _new_parameters(world, chosen, rows, mass, size, inertia_body, friction, restitution, effects)
@@ -54,20 +54,22 @@ def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution
 
 
 def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str = "start") -> None:
-    """Give worlds new states and new parameters at once; after an error nothing has changed.
+    """Give some worlds new states and new parameters at once; after an error nothing has changed.
 
-    States and parameters are checked together: the old state need not be possible with the new sizes, nor the reverse.
+    New states are checked with the new parameters: the old state need not fit the new sizes.
 
     Parameters
     ----------
     world : Batch
+        Batch to change.
     worlds : (k,) int array_like
+        Indices of the worlds to change.
     state : mapping
-        Arguments of `World.set_state`.
+        Arguments of `World.set_state` by name.
     given : mapping
-        Arguments of `World.set_parameters`.
+        Arguments of `World.set_parameters` by name.
     what : str
-        What an error about the place of a body begins with.
+        First words of an error about the place of a body.
     """
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
@@ -87,7 +89,7 @@ def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str =
 
 
 def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndarray:
-    """New rows of the state: arguments that are not None replace the old columns."""
+    """Make the new rows of `state` for the chosen worlds: arguments that are not None replace the old columns."""
     state = world.state[rows]
     given = (("pos", pos, at.POS, 3), ("quat", quat, at.QUAT, 4), ("linvel", linvel, at.LINVEL, 3),
              ("angvel", angvel, at.ANGVEL, 3))  # fmt: skip
@@ -102,7 +104,7 @@ def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndar
 
 
 def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, friction, restitution, effects) -> np.ndarray:
-    """New rows of the parameters: arguments that are not None replace the old columns."""
+    """Make the new rows of `params` for the chosen worlds: arguments that are not None replace the old columns."""
     params = world.params[rows]
     plan, shape = world.plan, (len(chosen), world.body_count)
     if mass is not None or size is not None or inertia_body is not None:
@@ -119,7 +121,7 @@ def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, fricti
 
 
 def _write_effects(world: Batch, chosen, params, effects) -> None:
-    """Laws of contact and force fields into rows of the parameters."""
+    """Write the numbers of the given effects (contact laws, force fields) into rows `params` of the chosen worlds."""
     if isinstance(effects, (str, bytes)):
         raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
     effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
@@ -137,14 +139,14 @@ def _write_effects(world: Batch, chosen, params, effects) -> None:
 
 
 def _new_gravity(world: Batch, chosen, gravity) -> np.ndarray:
-    """(k, 3) gravity of the chosen worlds [m/s²]."""
+    """Check the gravity given for the chosen worlds; return it as (k, 3) [m/s²]."""
     _needs("gravity", world.plan.gravity, "physics.Gravity(...)")
     field = validation.batch(gravity, (len(chosen), 1, 3), "gravity")[:, 0]
     return validation.finite(field, field.shape, "gravity")
 
 
 def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse impossible starts: bodies deep in a wall, or in the same place.
+    """Refuse states with a body deep inside a wall, or with the centres of two touching bodies in the same place.
 
     Parameters and errors are those of `check_depth`.
     """
@@ -154,10 +156,10 @@ def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 
 
 def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse two touching bodies with their centres in the same place, which have no shortest way apart.
+    """Refuse two bodies with their geometric centres in the same place, since no direction separates them best.
 
-    Bodies in the same place are neighbours in the order along any direction. Along a direction that scenes seldom use,
-    hardly any other bodies are neighbours.
+    Bodies are sorted along the direction `SKEW`, and only neighbours in this order are compared. Equal centres are
+    neighbours along any direction; other centres hardly ever coincide along this one.
     """
     shape = (len(chosen), world.body_count)
     centres = geometric_centres(world, state, params).reshape(*shape, 3)
@@ -182,22 +184,23 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
 
 
 def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse bodies that are deep inside a wall.
+    """Refuse states with a body deeper inside a wall than allowed.
 
     Parameters
     ----------
     world : Batch
+        Batch with the scene of these states.
     state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
-        Rows to look at.
+        States and parameters to check, a row for each body.
     chosen : (k,) int64
-        The worlds that these rows belong to.
+        Indices of the worlds that the rows belong to.
     what : str
-        What the message begins with.
+        First words of the message.
 
     Raises
     ------
     ValueError
-        Naming the first such body, where it is, and how deep it may be.
+        A body is too deep inside a wall. The message names the first such body, its place and the allowed depth.
     """
     if not world.plan.contact:
         return
@@ -215,7 +218,10 @@ def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 
 
 def _adopt(world: Batch, chosen, rows, state, params, what, keep_memory=False) -> None:
-    """Check new rows of state and parameters, then write them."""
+    """Check new rows of state and parameters of the chosen worlds, then write them into the batch.
+
+    Contact memory is cleared unless `keep_memory`. Sleeping bodies wake, and the recorder is notified.
+    """
     check_place(world, state, params, chosen, what)
     write_angular_momenta(np.arange(len(rows)), state, params)
     world.state[rows] = state
@@ -242,7 +248,7 @@ def _check_axis(friction: Friction, declared: Friction) -> None:
 
 
 def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
-    """Kinds of field in the scene that `effects` belong to, with these in place of the scene's."""
+    """Field slots of the scene whose fields `effects` replace, with the new fields in them; ValueError for others."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if not isinstance(effect, Field):
@@ -269,10 +275,10 @@ def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
 
 
 def _chosen(world: Batch, worlds) -> np.ndarray:
-    """Indices (k,) int64 of the worlds that a user chooses."""
+    """Indices (k,) int64 of the worlds that a user chose; None: all."""
     return np.arange(world.worlds) if worlds is None else choice.world_indices(worlds, world.worlds)
 
 
 def _rows(world: Batch, chosen: np.ndarray) -> np.ndarray:
-    """Rows (k * bodies,) of these worlds in the arrays of bodies."""
+    """Indices (k * bodies,) of the rows of the chosen worlds in arrays with a row for each body."""
     return (chosen[:, None] * world.body_count + np.arange(world.body_count)).ravel()

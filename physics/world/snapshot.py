@@ -1,4 +1,4 @@
-"""Snapshots: copies of all that decides the future of a world."""
+"""Snapshots: copies of everything that decides how worlds go on, in memory and as files."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from physics.version import version
 from physics.world.headed_file import FileKind, head_value, is_text
 
 FILE = FileKind("snapshot", "snapshot", "Snapshot.save", format=2)
-TIMES = 1  # the format in which commands have times instead of ages, and the scene is not told
+TIMES = 1  # the format in which commands have times instead of ages, and the settings of the scene are missing
 
-# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one where bodies may sleep.
+# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one only where bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
 
 
@@ -33,19 +33,19 @@ class Snapshot:
     Parameters
     ----------
     arrays : tuple of float64 arrays
-        Of `KEPT`; rows are those of its first world, then of its second, and so on.
+        Copies of the arrays that `KEPT` names; rows are those of the first world, then of the second, and so on.
     time : float
-        Of the batch that it was taken of [s].
+        Time of the batch when the snapshot was taken [s].
     actuation : tuple or None
         Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands, oldest first: a list
         of the age of each [s] and the command (worlds * bodies, 6). None without an actuator.
     compiler : str
-        The one that made it (`physics.compiler.compiler_choice`): with another one a world goes on with other
-        last bits.
+        Compiler of the session that took it (`physics.compiler.compiler_choice`). Under another compiler a world goes
+        on with other last bits.
     is_read : bool
-        It is of a file: whoever restores it looks at its numbers first.
+        Whether the snapshot was read from a file, so that its numbers are checked before it is restored.
     scene : dict of str to str or None
-        Settings of its scene that the arrays do not hold (`physics.world.scene_settings`); None: not told.
+        Settings of its scene that the arrays do not hold (`physics.world.scene_settings`); None: unknown.
     """
 
     arrays: tuple[np.ndarray, ...]
@@ -61,24 +61,25 @@ class Snapshot:
         return len(self.arrays[KEPT.index("gravity")])
 
     def renew(self, time: float, actuation: tuple | None, scene: Mapping[str, str]) -> None:
-        """Mark the snapshot as new, after `arrays` have been overwritten (`World.snapshot` with `out`)."""
+        """Set everything but the arrays, after `World.snapshot` with `out` has overwritten these."""
         new = {"time": time, "actuation": actuation, "compiler": COMPILER, "is_read": False, "scene": scene}
         for name, value in new.items():
             object.__setattr__(self, name, value)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write the snapshot as ``.npz`` (`load` reads it); return the path.
+        """Write the snapshot as an ``.npz`` file, which `load` reads; return the path.
 
         Parameters
         ----------
         path : str or Path
+            Path of the file; an existing file is overwritten.
         """
         with open(validation.path(path), "wb") as file:
             self.write(file)
         return Path(path)
 
     def write(self, file: BinaryIO) -> None:
-        """Write the snapshot into an open file, as `save` does."""
+        """Write the snapshot into an open binary file, as `save` does."""
         parts: dict[str, Any] = {"time": np.float64(self.time), **dict(zip(KEPT, self.arrays))}
         if self.actuation is not None:
             output, late = self.actuation
@@ -95,11 +96,12 @@ class Snapshot:
         Parameters
         ----------
         path : str or Path
+            Path of the file.
 
         Raises
         ------
         ValueError
-            It is no snapshot, a damaged one, or one of a newer format.
+            The file is no snapshot, is damaged, or has a newer format.
         OSError
             The file cannot be read.
         """
@@ -107,7 +109,7 @@ class Snapshot:
 
     @classmethod
     def read(cls, content: BinaryIO, path: str | os.PathLike) -> Snapshot:
-        """Read the content of a file as `load` does; errors name the file `path`."""
+        """Read a snapshot from an open binary file as `load` does; errors call the file `path`."""
         return FILE.read(content, path, _from_parts)
 
     __repr__ = parts_repr
@@ -123,7 +125,7 @@ def _is_scene(value: Any) -> bool:
 
 
 def _from_parts(head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> Snapshot:
-    """Make a snapshot of the head and the arrays of a file; its user checks whether it fits a scene."""
+    """Make a snapshot from the head and the arrays of a file; the shapes are checked, but not against a scene."""
     compiler, scene = head_value(head, "compiler", is_text, "the name of a compiler"), None
     if head["format"] > TIMES:
         scene = head_value(head, "scene", _is_scene, "null and settings of a scene by name, as text")

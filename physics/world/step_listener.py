@@ -1,4 +1,4 @@
-"""Interface of listeners to a world's steps, so that a world needs no import of its recorder."""
+"""Interface of objects that a world notifies of its steps; with it a world needs no import of its recorder."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 
 
 class StepListener(Protocol):
-    """Listener to every step of a world, such as `physics.Recorder`."""
+    """Object that a world notifies of every step and change, such as a `physics.Recorder`."""
 
     def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Note that `steps` steps of `dt` [s] are about to be taken with a wrench (worlds, bodies, 6)."""
+        """Called before `steps` steps of `dt` [s] with a wrench (worlds, bodies, 6)."""
 
     def after(self) -> None:
-        """Note that the steps have been taken."""
+        """Called after the steps that `before` announced."""
 
     def undone(self) -> None:
-        """Note that the steps were undone: an exception has restored everything."""
+        """Called after an exception during the steps, when the state before them is restored."""
 
     def changed(self, worlds: np.ndarray | slice) -> None:
-        """Note that these worlds were changed from outside."""
+        """Called after a user has changed or restored these worlds (indices or a slice)."""

@@ -1,4 +1,4 @@
-"""A step prepared once and taken often: from a world to bound calls of its compiled kernel."""
+"""Steps that are prepared once and taken often: calls of a world's step kernel with all arguments bound."""
 
 from __future__ import annotations
 
@@ -15,27 +15,28 @@ from physics.parallel.exclusive import in_use
 from physics.summary import shown
 from physics.world.batch import Batch
 
-# Which argument of all step kernels the `TimeGrid` is.
+# Index of the `TimeGrid` among the arguments of every step kernel.
 GRID = 1
 
 
 @known_keywords
 class Stepper:
-    """The same step of a world again and again, with all that can be checked or looked up done before.
+    """Repeated step of a world, faster than `World.step`: checks and look-ups are made once, at the first call.
 
-    For loops in which that takes longer than the step of one world itself: the wrench is an array to write into,
-    and a call is the step alone.
+    It serves loops in which these take longer than the step of one world. The wrench is written into an array, the
+    attribute `wrench`; calling the object makes the steps.
 
     Parameters
     ----------
     world : Batch
+        The `World` to step.
     steps : int
-        Steps that one call takes.
+        Steps that one call makes.
     dt : float, optional
-        Time of one of them, instead of the world's [s].
+        Length of a step [s]; None: that of the world.
     then : Callable, optional
-        What each thread does with the worlds that it has stepped: from their list, as of
-        `physics.kernels.parallel.work_stealing`, which every call renews, to a kernel that has it
+        Makes the kernel call with which each thread goes on after its steps. It takes the thread's list of worlds
+        stepped, an array of `physics.kernels.parallel.work_stealing` that every call renews, and returns a bound call
         (`physics.parallel.bound_call.bound`).
 
     Raises
@@ -62,21 +63,22 @@ class Stepper:
         self._then = then
         self._calls: list[BoundCall] | None = None
         self._afterwards: list[BoundCall] = []
-        self._alone: Any = None  # the `BoundCall` of `_calls` the only one, where nothing else has a part in a step
-        self._perform: Callable[[], bool] | None = None  # of that
+        self._alone: Any = None  # the only one of `_calls`, where a step is this call and nothing else
+        self._perform: Callable[[], bool] | None = None  # method of `_alone`
         self._duration = self.steps * self.dt
 
     @property
     def wrench(self) -> np.ndarray:
-        """(worlds, bodies, 6) float64 to write into: force [N] and torque about the centre of mass [N m].
+        """Wrench of the next call, to be written into: force [N] and torque about the centre of mass [N m].
 
-        World frame, held during a call (with an actuator: the command that it is given); zeros at first. What is in
-        it is not checked: a body whose new state is not finite keeps the old one, and `World.report` says so.
+        (worlds, bodies, 6) float64, world frame, zero at first. It acts during the whole call; with an actuator it is
+        the command. Its numbers are not checked: a body whose new state would not be finite keeps the old one, and
+        `World.report` says so.
         """
         return self._wrench
 
     def __call__(self) -> None:
-        """Advance every world by `steps` times `dt`.
+        """Advance every world by `steps` steps of `dt` under `wrench`.
 
         Raises
         ------
@@ -91,7 +93,7 @@ class Stepper:
         try:
             if perform is None or world.recorder is not None:
                 self._advance()
-            else:  # what `World.advance` comes to, in half the time
+            else:  # the same as `World.advance` in this case, in half the time
                 if perform():
                     self._alone.raise_again()
                 world.time += self._duration
@@ -111,7 +113,7 @@ class Stepper:
         self.world.is_bound = True
         if self._then is not None:
             following = [self._then(taken) for taken in self.world.team.taken]
-            if takes_each_step(self.world) and self.steps > 1:  # with calls of their own
+            if takes_each_step(self.world) and self.steps > 1:  # each step is a call of its own
                 self._afterwards = following
             else:
                 calls = [first.then(second) for first, second in zip(calls, following, strict=True)]
@@ -125,14 +127,15 @@ class Stepper:
 
 
 def takes_each_step(world: Batch) -> bool:
-    """A call of several steps is made step by step, since the actuator is asked at each."""
+    """True if several steps must be separate kernel calls, since an actuator with a memory acts before each step."""
     return world.actuation is not None and world.actuation.actuator.remembers
 
 
 def _is_all(world: Batch, calls: list[BoundCall]) -> bool:
-    """True if a step is this call: there is one thread, no actuator, and `Batch.make` has nothing to add.
+    """True if a step consists of the single call in `calls`: one thread, no actuator, and `Batch.is_plain`.
 
-    What `World.advance` does besides; a recorder, which comes and goes, is looked up in each call.
+    These are all other parts of `World.advance`, save the recorder. A recorder may come and go, so that each call of a
+    `Stepper` looks for it.
     """
     return len(calls) == 1 and world.actuation is None and world.is_plain
 
@@ -140,20 +143,20 @@ def _is_all(world: Batch, calls: list[BoundCall]) -> bool:
 def kernel_calls(
     world: Batch, wrench: np.ndarray, steps: int, dt: float, queues: Sequence[WorkQueue] | None = None
 ) -> list[BoundCall]:
-    """One call of the step kernel for each thread, all arguments bound.
+    """Bind the arguments of the step kernel: make a call of it for each thread.
 
     Parameters
     ----------
     world : Batch
-        Its arrays are bound, not the world itself: it may keep the calls, and is freed with its last user.
+        Batch whose arrays are bound. The calls hold no reference to the batch, which may therefore keep them.
     wrench : (worlds, bodies, 6) float64, contiguous and writable
-        What it holds when a call is made counts; of a scene with an actuator what that makes of it.
+        Array from which each call reads the wrenches. With an actuator the calls read the actuator's output instead.
     steps : int
-        Where an actuator remembers, a call takes one of them.
+        Steps that a call makes; a call makes one step where `takes_each_step`.
     dt : float
-        [s].
+        Length of a step [s].
     queues : sequence of WorkQueue, optional
-        Worlds that each thread may take, instead of those of its team.
+        Queues from which the threads take worlds; None: those of the batch's team.
     """
     plan = world.plan
     queues = world.team.queues if queues is None else queues
@@ -169,12 +172,12 @@ def kernel_calls(
 
 
 def retime(world: Batch, calls: list[BoundCall], steps: int, dt: float) -> None:
-    """Let `kernel_calls` of a world take so many steps of another `dt` [s]: faster than to prepare others."""
+    """Change the number of steps and their length `dt` [s] in calls that `kernel_calls` made, without new calls."""
     for call in calls:
         call.put(GRID, _time_grid(world, steps, dt))
 
 
 def _time_grid(world: Batch, steps: int, dt: float) -> TimeGrid:
-    """Time that a kernel is called for."""
+    """Time grid of a kernel call: steps, substeps of each, and length of a substep [s]."""
     substeps = world.accuracy.substeps
     return TimeGrid(1 if takes_each_step(world) else steps, substeps, dt / substeps)

@@ -1,4 +1,4 @@
-"""Contacts and impacts of a batch of worlds, as users read them: the part of `World` that tells what touches."""
+"""Contacts and impacts of a batch of worlds, as users read them: methods of `World`."""
 
 from __future__ import annotations
 
@@ -24,43 +24,43 @@ MOST_ROWS = 65_536
 
 
 class Touching(Batch):
-    """Part of `World` that reads contacts and impacts."""
+    """Base of `World` with the methods that read contacts and impacts."""
 
     def read_contacts(
         self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | None = None
     ) -> Contacts:
-        """Read the resting contacts of many worlds at their last step.
+        """Read the resting contacts of many worlds in their last step.
 
         Parameters
         ----------
         worlds : (n,) int array_like or (worlds,) mask, optional
-            Worlds that are read, in this order; None: all.
+            Indices of the worlds to read, in this order; None: all.
         rows : int, optional
-            Contacts of each world that are shown: those with the largest forces. None: 12 for each body, at most as
-            many as there is room for.
+            Largest number of contacts for each world; a world with more shows those with the largest forces. None: 12
+            for each body, limited by the room of the contact memory.
         body : int, optional
-            Only the contacts of this body, which then is their first one.
+            Index of a body: only its contacts are read, with it as their first body.
 
         Returns
         -------
         Contacts
-            New arrays with a row for each world; see there for units, frames, order and the step that they are of.
+            New arrays with a row for each world; `Contacts` documents units, frames and order.
 
         Raises
         ------
         ValueError
-            A world or a body that is not there, or rows out of range.
+            A world or a body that does not exist, or `rows` out of range.
         """
         indices, of = self._chosen(worlds), self._body(body)
         return read_contacts(self, indices, contact_rows(self) if rows is None else _rows(rows), of)
 
     def read_contact_sums(self, worlds: ArrayLike | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Read the sums of the resting contacts of each body.
+        """Read the sums of the forces and impulses of all resting contacts of each body in the last step.
 
         Parameters
         ----------
         worlds : (n,) int array_like or (worlds,) mask, optional
-            Worlds that are read, in this order; None: all.
+            Indices of the worlds to read, in this order; None: all.
 
         Returns
         -------
@@ -70,7 +70,7 @@ class Touching(Batch):
         Raises
         ------
         ValueError
-            A world that is not there.
+            A world that does not exist.
         """
         indices = self._chosen(worlds)
         force, impulse = (np.empty((len(indices), self.body_count, 3)) for _ in range(2))
@@ -81,21 +81,21 @@ class Touching(Batch):
     @known_keywords
     @exclusive
     def keep_impacts(self, room: int = IMPACT_ROOM) -> None:
-        """Keep the impacts of each step from now on, for `read_impacts`; without this a step keeps none.
+        """Keep the impacts of each step from now on, for `read_impacts`; without this call a step keeps none.
 
-        States keep their bits. A world that has them already keeps the larger room.
+        The bits of the states do not depend on it. A second call can only enlarge the room.
 
         Parameters
         ----------
         room : int
-            Events of a body in one call of a step that there is room for; 104 bytes each. Events are impacts; of the
-            scheme ``events`` also contacts that begin, end, stick and slip. `StepReport.left_out` and
-            `Impacts.left_out` count those without room.
+            Number of events for which there is room, for each body and kernel call; an event takes 104 bytes. Events
+            are impacts; with the scheme ``events`` also contacts that begin, end, stick and slip. `StepReport.left_out`
+            and `Impacts.left_out` count events without room.
 
         Raises
         ------
         ValueError
-            `room` is out of range, or a `Stepper` of this world has taken a step: it would not keep them.
+            `room` is out of range, or a `Stepper` of this world has taken a step; its calls could not keep impacts.
         """
         room = validation.count(room, "room")
         if self.impacts is not None and self.impacts.room >= room:
@@ -117,22 +117,23 @@ class Touching(Batch):
         Parameters
         ----------
         worlds : (n,) int array_like or (worlds,) mask, optional
-            Worlds that are read, in this order; None: all.
+            Indices of the worlds to read, in this order; None: all.
         rows : int, optional
-            Pairs of each world that are shown: those with the largest impulses. None: as many as of `read_contacts`.
+            Largest number of pairs for each world; a world with more shows those with the largest impulses. None: as
+            many as in `read_contacts`.
         body : int, optional
-            Only the pairs of this body, which then is their first one. `Impacts.total` holds all bodies.
+            Index of a body: only its pairs are read, with it as their first body. `Impacts.total` covers all bodies.
 
         Returns
         -------
         Impacts
-            New arrays with a row for each world; see there for units, frames, order and the step that they are of.
+            New arrays with a row for each world; `Impacts` documents units, frames and order.
 
         Raises
         ------
         ValueError
-            A world or a body that is not there, rows out of range, or a last step whose impacts were not kept:
-            `keep_impacts` comes first.
+            A world or a body that does not exist, `rows` out of range, or a last step whose impacts were not kept,
+            since `keep_impacts` was not called before it.
         """
         if self.impacts is None or not self.impacts.is_known:
             raise ValueError(
@@ -143,27 +144,27 @@ class Touching(Batch):
         return read_impacts(self, self.impacts, indices, contact_rows(self) if rows is None else _rows(rows), of)
 
     def contacts(self, world: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Contact points and forces of one world's last step; `read_contacts` reads many worlds, and tells more.
+        """Points and forces of the resting contacts in the last step of one world; `read_contacts` reads many worlds.
 
         Returns
         -------
         points : (n, 3) float64
-            World frame [m].
+            Contact points, world frame [m].
         forces : (n, 3) float64
-            On the body, of two bodies on the first one, world frame [N]. Time stepping averages them over the last
-            resting stage; the event-driven scheme has those at the end of the step. A stage is the whole step unless
-            something was met in it. Then forces times step, impulses of impacts (`read_impacts`) and loads make up
-            the change of momentum, but for bodies that were pushed out of walls.
+            Forces on the body, or on the first of two bodies, world frame [N]. Time stepping averages them over the
+            last resting stage; the event-driven scheme has those at the end of the step. A resting stage is the whole
+            step unless an impact cuts the step. In an uncut step forces times step, impulses of impacts
+            (`read_impacts`) and loads add up to the change of momentum, except for bodies pushed out of walls.
         """
         found = contacts_of_world(self, self._index(world))
         return found.point[0], found.force[0]
 
     def contact_ends(self, world: int = 0) -> NDArray[np.int64]:
-        """(n, 2) int64: body, and other body or -1 - k for wall k, of each of the `contacts` of one world."""
+        """Bodies of each of the `contacts` of one world, (n, 2) int64: first body; other body, or -1 - k for wall k."""
         return contacts_of_world(self, self._index(world)).ends[0]
 
     def touching(self, world: int = 0) -> set[tuple[int, int]]:
-        """(body, wall) of every resting contact with a wall of one world at its last step."""
+        """Pairs (body, wall) that have a resting contact in the last step of one world, as indices."""
         return {(int(body), -1 - int(other)) for body, other in self.contact_ends(world) if other < 0}
 
     def _index(self, world: int) -> int:

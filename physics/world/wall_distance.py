@@ -11,7 +11,7 @@ from physics.world.batch import Batch
 
 
 def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np.ndarray:
-    """Centres of the bodies' shapes, (k * bodies, 3) float64, world frame [m]; arguments as of `wall_gaps`."""
+    """Geometric centres of bodies (k * bodies, 3) float64, world frame [m]; the arguments are those of `wall_gaps`."""
     centres = state[:, at.POS : at.POS + 3]
     if world.plan.offset_frame:
         R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
@@ -20,20 +20,21 @@ def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np
 
 
 def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest gap of every body over all walls.
+    """Smallest gap of every body to any wall.
 
     Parameters
     ----------
     world : Batch
-        Its scene says what the rows are of.
+        Batch with the scene of these states: its bodies and walls.
     state, params : (k * bodies, STATE_SIZE | PARAM_SIZE) float64
+        States and parameters of the bodies of k worlds, a row for each body.
 
     Returns
     -------
     gaps : (k * bodies,) float64
-        [m], negative inside; very large without walls.
+        Smallest gap of each body [m], negative inside a wall; very large without walls.
     which : (k * bodies,) int64
-        The wall that it is at, -1 without walls.
+        Index of the wall with the smallest gap; -1 without walls.
     """
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
     deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)

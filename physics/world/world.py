@@ -1,4 +1,4 @@
-"""A batch of independent worlds of one scene, and the step that advances them."""
+"""Batch of independent worlds of one scene: its state, its step, and changes of it by a user."""
 
 from __future__ import annotations
 
@@ -38,22 +38,23 @@ from physics.world.touching import Touching
 
 @known_keywords
 class World(Touching):
-    """Many worlds of one scene, stepped together and independent of each other.
+    """Batch of independent worlds of one scene, which are stepped together.
 
-    The same world gives the same bits whatever the batch size, its place in the batch and the number of threads.
+    A world gives the same bits whatever the batch size, its place in the batch and the number of threads.
 
     Parameters
     ----------
     scene : Scene
+        Description of bodies, walls and effects.
     worlds : int
-        Size of the batch.
+        Number of worlds of the batch.
     dt : float
-        Time that one `step` advances [s].
+        Length of a step [s].
     accuracy : str or Accuracy
         ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
     threads : int
-        Threads that share a step, at most as many as processors: each takes worlds of its own range, then of the
-        others'. Between steps that follow each other within 0.3 ms they wait without sleeping.
+        Threads that share a step, at most as many as processors. Each takes worlds of its own range first, then of the
+        ranges of others. Threads wait without sleeping between steps that follow each other within 0.3 ms.
 
     Attributes
     ----------
@@ -62,7 +63,7 @@ class World(Touching):
     time : float
         Time since the start [s].
 
-    What else it holds stands in `physics.world.batch.Batch`.
+    `physics.world.batch.Batch` documents all other attributes.
 
     Raises
     ------
@@ -120,7 +121,7 @@ class World(Touching):
 
     def _prepare_threads(self) -> None:
         self.is_free, self.is_torn = True, False
-        self.telling = None  # the thread that tells the recorder of its step
+        self.telling = None  # identifier of the thread that is notifying the recorder
         watch(self)
         self.team = Team(self.threads, self.worlds)
         register_terms(self.plan.terms)
@@ -135,15 +136,16 @@ class World(Touching):
         ]
         self._wrench = self.no_wrench()
         self._calls: list[BoundCall] = []
-        self._bound_for: tuple | None = None  # arguments of `step`: the next call with the same finds all bound
+        self._bound_for: tuple | None = None  # steps and dt for which `_calls` are bound
 
     @exclusive
     def make_event_room(self, room: int) -> None:
-        """Give a step's log room for `room` events per body, 0 at first; for `simulate`.
+        """Make room for `room` events of each body in the log of a kernel call, for `simulate`; at first there is none.
 
         Events go to `event_log` (worlds * bodies, room, EVENT_SIZE), with columns in
         `physics.kernels.time_stepping.event_log`. Their number goes to `event_counts` (worlds * bodies,) int64, and
-        includes events without room. Prepare a `Stepper` after this. `keep_impacts` may have made more room.
+        includes events without room. The room that `keep_impacts` made is never reduced. A `Stepper` must be made
+        after this call.
         """
         self._make_event_room(room if self.impacts is None else max(room, self.impacts.room))
 
@@ -163,28 +165,28 @@ class World(Touching):
     # --- stepping ----------------------------------------------------------------------------------------------
 
     def step(self, wrench: ArrayLike | None = None, steps: int = 1, dt: float | None = None) -> StepReport:
-        """Advance every world by `steps` times `dt`.
+        """Advance every world by `steps` steps of `dt`.
 
         Parameters
         ----------
         wrench : (worlds, bodies, 6) array_like, optional
-            Force [N] and torque about the centre of mass [N m], world frame, held all the time. None: no wrench.
-            (bodies, 6): the same for all worlds. Of a scene of one body also (6,), the same for all worlds, and
-            (worlds, 6). A scene of several bodies takes two axes as (bodies, 6), whatever the number of worlds.
+            Force [N] and torque about the centre of mass [N m], world frame, constant during the call. None: no wrench.
+            (bodies, 6): the same for all worlds. With one body also (6,), the same for all worlds, and (worlds, 6).
+            With several bodies two axes are always (bodies, 6), whatever the number of worlds.
         steps : int
-            Steps to take at once.
+            Number of steps.
         dt : float, optional
-            Instead of the world's, for this call [s].
+            Length of a step for this call [s]; None: that of the world.
 
         Returns
         -------
         StepReport
-            Of all these steps together.
+            Report of all these steps together.
 
         Raises
         ------
         ValueError
-            A wrench of the wrong shape or not finite, or steps or dt out of range; nothing has moved then.
+            A wrench of the wrong shape or not finite, or steps or dt out of range. The worlds are unchanged then.
         RuntimeError
             Another thread is stepping or changing this world.
         """
@@ -213,15 +215,16 @@ class World(Touching):
         return self.report
 
     def advance(self, calls: list[BoundCall], wrench: np.ndarray, steps: int, dt: float) -> None:
-        """Run the `kernel_calls` of some steps of `dt` [s] with this wrench, for callers that prepare them.
+        """Advance all worlds by `steps` steps of `dt` [s] with prepared kernel calls (`stepper.kernel_calls`).
 
-        A `Stepper` skips this function if one call is enough; `stepper._is_all` lists the other parts of a step. If a
-        user's field raises an exception nothing has changed.
+        Recorder and actuator take part: `wrench` (worlds, bodies, 6) is the command. If a user's field raises an
+        exception, the worlds return to the state before. A `Stepper` makes its kernel call without this function where
+        that is the whole step (`stepper._is_all`).
         """
         if self._may_raise:
             with undo_on_error(rollback.remember(self)):
                 self._make_steps(calls, wrench, steps, dt)
-        elif self.recorder is None and self.actuation is None:  # without a call more, which takes 3 % of a step
+        elif self.recorder is None and self.actuation is None:  # saves one Python call, 3 % of a step
             self.make(calls, steps * dt)
         else:
             self._make_steps(calls, wrench, steps, dt)
@@ -237,7 +240,7 @@ class World(Touching):
             self.actuation.advance(self, calls, wrench, steps, dt)
 
     def _tell(self, message: Callable[..., None], *arguments) -> None:
-        """Notify the recorder, which may take snapshots meanwhile."""
+        """Call a method `message` of the recorder, during which it may take snapshots of this world."""
         self.telling = get_ident()
         try:
             message(*arguments)
@@ -246,7 +249,7 @@ class World(Touching):
 
     @property
     def report(self) -> StepReport:
-        """Report of the last step, also of one taken by another caller."""
+        """Report of the last step, whether `step`, a `Stepper` or a rollout made it; a copy."""
         return StepReport(self.report_table.copy(), self.names)
 
     # --- changing ----------------------------------------------------------------------------------------------
@@ -266,19 +269,20 @@ class World(Touching):
         Parameters
         ----------
         pos, quat, linvel, angvel : (k, bodies, 3|4|3|3) array_like, optional
-            World frame; k is the number of worlds meant. (bodies, 3|4|3|3): the same for all of them. Of a scene of
-            one body the axis of bodies may be left out: (3,) for all worlds alike, (k, 3) a row for each. A scene of
-            several bodies takes two axes as (bodies, 3), also where k is the same number. A quaternion of norm 1
-            within 1e-4 is normalised.
+            Position of the centre of mass [m], attitude (w, x, y, z), velocity [m/s] and angular velocity [rad/s],
+            world frame, for k worlds. (bodies, 3|4|3|3): the same for all of them. With one body the axis of bodies
+            may be left out: (3,) for all worlds alike, (k, 3) a row for each. With several bodies two axes are always
+            (bodies, 3), even if k is the same number. A quaternion of norm 1 within 1e-4 is normalised.
         worlds : (k,) int array_like, optional
-            Indices of the worlds meant; None: all. Their contact memory is cleared, and that of their actuators.
+            Indices of the worlds to change; None: all. Their contact memory and the memory of their actuators are
+            cleared.
 
         Raises
         ------
         ValueError
-            A wrong shape, a number that is not finite, no unit quaternion, a world named twice or not there, a body
-            deep inside a wall, or two bodies that touch each other with their centres in the same place. Nothing has
-            changed then.
+            A wrong shape, a number that is not finite, no unit quaternion, a world that does not exist or is named
+            twice, a body deep inside a wall, or two bodies that can touch with their centres in the same place.
+            Nothing has changed then.
         """
         setters.set_state(self, pos, quat, linvel, angvel, worlds)
 
@@ -300,23 +304,25 @@ class World(Touching):
         Parameters
         ----------
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
-            [kg], coefficients. One axis is that of worlds wherever its length is k; (bodies,) of another length is for
-            all worlds alike. Of a `Friction` with two coefficients the first; the second changes with it. Two bodies
-            that touch have the geometric mean of their frictions and the larger restitution; a wall has the body's.
+            Masses [kg] and coefficients of the bodies of k worlds. A single axis of length k has a number for each
+            world; one of another length must be (bodies,), for all worlds alike. With a `Friction` of two coefficients
+            `friction` is the first, and the second changes by the same factor. Two bodies that touch have the geometric
+            mean of their frictions and the larger restitution; at a wall the body's own coefficients act.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
-            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]; a hull
-            cannot change its size: twice its `dimensions`.
-            Position and velocity stay, and so does the `center` of a block: in metres, not as a share of the edges.
+            Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]. The size
+            of a hull cannot change: only twice its `dimensions` is accepted. Position and velocity stay, and so does
+            the `center` of a block, in metres.
         inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
-            [kg m²]. Where it is None, a change of mass or size sets the uniform-density value, unless the
-            scene's body has an `inertia_body` of its own, which then scales with the mass.
+            Inertia tensor about the centre of mass, body frame [kg m²]. None: a change of mass or size sets the tensor
+            of uniform density; if the scene's body has an `inertia_body`, this is scaled with the mass instead.
         gravity : (3,) or (k, 3) array_like, optional
-            [m/s²].
+            Acceleration of gravity, world frame [m/s²].
         effects : sequence of effects, optional
-            Force fields in place of the scene's of the same class (of `Spring` and `Push` all, in the scene's order;
-            springs between bodies count for themselves), `Friction`, `RollingFriction` and `SpinFriction` likewise.
+            Force fields that replace the scene's fields of the same class; also `Friction`, `RollingFriction` and
+            `SpinFriction`. Of `Spring` and `Push` all must be given, in the scene's order. Springs between two bodies
+            count as a class of their own.
         worlds : (k,) int array_like, optional
-            Indices of the worlds meant; None: all.
+            Indices of the worlds to change; None: all.
 
         Raises
         ------
@@ -331,19 +337,19 @@ class World(Touching):
     @known_keywords
     @exclusive
     def snapshot(self, worlds: ArrayLike | None = None, out: Snapshot | None = None) -> Snapshot:
-        """Copy the whole state; `restore` continues it bit for bit, warm starts included.
+        """Copy the whole state of worlds; after `restore` they go on from it bit for bit, warm starts included.
 
         Parameters
         ----------
         worlds : (k,) int array_like, optional
-            Indices of the worlds meant, or a mask; None: all.
+            Indices of the worlds to copy, or a mask; None: all.
         out : Snapshot, optional
-            One of as many worlds, to be overwritten and returned: faster where a snapshot is taken often.
+            Snapshot of k worlds, which is overwritten and returned: faster where snapshots are taken often.
 
         Raises
         ------
         ValueError
-            A world named twice or not there, or `out` of another size. Nothing has changed then.
+            A world that does not exist or is named twice, or `out` of another size. Nothing has changed then.
         """
         return restoring.capture(self, worlds, out)
 
@@ -351,36 +357,36 @@ class World(Touching):
     def restore(
         self, snapshot: Snapshot, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
     ) -> None:
-        """Let worlds go on from a snapshot of this scene, bit for bit as those that it was taken of.
+        """Set worlds to the state in a snapshot; from it they go on bit for bit like the worlds that were copied.
 
         Parameters
         ----------
         snapshot : Snapshot
-            Of any batch of this scene, `World.snapshot`.
+            Snapshot of any batch of this scene, from `World.snapshot`.
         worlds : (k,) int array_like, optional
-            Indices of the worlds of this batch that change, each once, or a mask; None: all.
+            Indices of the worlds of this batch to change, each once, or a mask; None: all.
         source : (k,) int array_like or int, optional
-            Worlds of the snapshot from which these go on; one may be named several times, and an int is for all. None:
-            the snapshot has one world, for all of them, or k worlds, in this order.
+            Index within the snapshot of the world from which each gets its state; an index may repeat, and an int is
+            for all. None: the snapshot has one world, for all of them, or k worlds, in this order.
 
         Raises
         ------
         ValueError
-            It is no `Snapshot`, or one of another scene; indices out of range or of another number; or some worlds
-            would go on at another time than the batch's, in a scene with a field that may change with time. Nothing
-            has changed then.
+            `snapshot` is no `Snapshot`, or one of another scene; indices are out of range or of another count; or
+            only some worlds would be restored, from another time than that of the batch, in a scene with a field that
+            may change with time. Nothing has changed then.
 
         Notes
         -----
-        A batch has one `time`. It becomes the snapshot's where all worlds are restored, and stays otherwise.
-        Commands that a delayed actuator still holds keep their age.
+        All worlds of a batch have the same `time`. It becomes that of the snapshot if all worlds are restored, and
+        stays otherwise. Commands that a delayed actuator still holds keep their age.
         """
         self.restore_targets(snapshot, restoring.find_targets(self, snapshot, worlds, source))
 
     def restore_targets(self, snapshot: Snapshot, targets: restoring.Targets) -> None:
-        """Do `restore` after its checks, for callers that made them with `restoring.find_targets`."""
+        """Restore worlds as `restore` does, without its checks: `targets` come from `restoring.find_targets`."""
         if self.is_torn and targets.is_all:
-            self.is_free, self.is_torn = True, False  # the thread of the parent process is not there to finish its step
+            self.is_free, self.is_torn = True, False  # the thread that was in a step does not exist in this process
         self._restore(snapshot, targets)
 
     @exclusive
@@ -389,7 +395,7 @@ class World(Touching):
 
     @property
     def asleep(self) -> NDArray[np.bool_]:
-        """Sleeping bodies (worlds, bodies) bool, a new array; see `physics.Sleeping`."""
+        """Mask (worlds, bodies) bool, True for bodies that sleep; a new array. See `physics.Sleeping`."""
         if not self.plan.sleeping:
             return np.zeros((self.worlds, self.body_count), dtype=np.bool_)
         return self.sleep[:, SLEEP_GROUP].reshape(self.worlds, self.body_count) > 0.0

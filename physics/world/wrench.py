@@ -1,4 +1,4 @@
-"""The wrench of a force at a point, for `World.step`."""
+"""Wrench of a force that acts at a point of a body, for `World.step`."""
 
 from __future__ import annotations
 
@@ -22,21 +22,25 @@ def wrench_at(
     frame: Frame = "world",
     point_frame: Frame = "body",
 ) -> np.ndarray:
-    """The wrench of a force at a point of each body, where the bodies are now.
+    """Compute the wrench of a force at a point of each body, for the bodies' present positions and attitudes.
 
     Parameters
     ----------
     world : World
+        Worlds with the bodies.
     force : (3,), (bodies, 3) or (worlds, bodies, 3) array_like
-        [N], along the axes of `frame`; zero for bodies that it does not act on.
+        Force on each body [N], along the axes of `frame`; zero for bodies without a force.
     point : (3,), (bodies, 3) or (worlds, bodies, 3) array_like
-        Where it acts [m]. ``body``: along the body axes from the centre of mass; ``world``: from the world's origin.
-    frame, point_frame : {"world", "body"}
+        Point at which the force acts [m], in `point_frame`.
+    frame : {"world", "body"}
+        Axes of `force`.
+    point_frame : {"world", "body"}
+        ``body``: `point` is given along the body axes from the centre of mass. ``world``: from the world's origin.
 
     Returns
     -------
     (worlds, bodies, 6) float64
-        Force [N] and torque about the centre of mass [N m], world frame. Several forces: the sum of their wrenches.
+        Force [N] and torque about the centre of mass [N m], world frame. Wrenches of several forces may be added.
 
     Raises
     ------
@@ -56,7 +60,7 @@ def wrench_at(
 
 
 def _spread(value, shape: tuple[int, int, int], field: str) -> np.ndarray:
-    """`value` for every world and body."""
+    """Check that `value` is finite, and broadcast it to `shape` (worlds, bodies, 3); an error calls it `field`."""
     allowed = f"shape (3,), {shape[1:]} or {shape}"
     array = validation.floats(value, field, f"are numbers in {allowed}")
     if array.shape not in ((3,), shape[1:], shape):

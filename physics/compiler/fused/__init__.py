@@ -1,1 +1,1 @@
-"""From a kernel's Python to machine code, by way of Numba and LLVM."""
+"""Fused compiler: it links all kernels of a step before they are optimised once, through private parts of Numba."""

@@ -1,8 +1,9 @@
-"""Switches of the optimisations of this compiler; each can be turned off to measure its worth.
+"""Switches of the optimisations of the fused compiler; each can be turned off to measure its benefit.
 
-The environment variable ``RIGID_ENV_WITHOUT=ranges,scalars`` leaves out these two; it is read once, on import. Numba's
-own way takes the place of each, and results differ in rounding at most. ``python -m benchmarks.ablation`` measures them
-in turns. Machine code made without one is kept in a folder of its own (`cache_folder.folder_name`).
+The environment variable ``RIGID_ENV_WITHOUT=ranges,scalars`` turns off these two; it is read once, on import. Numba's
+own method replaces an optimisation that is off, and results differ at most in rounding. Machine code made without some
+optimisations is kept in a folder of its own (`cache_folder.folder_name`). All are measured in turns by
+``python -m benchmarks.ablation``.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import os
 
 VARIABLE = "RIGID_ENV_WITHOUT"
 
-# By name; one that is named after a module is all of that module.
+# Descriptions by name. A name of a module of this folder stands for everything in that module.
 OPTIMISATIONS = {
     "argument_passing": "large tuples are handed on by address, not word by word",
     "array_elements": "elements of arrays are read and written directly, not by way of a copy of the array's words",
@@ -35,7 +36,7 @@ OPTIMISATIONS = {
     "untimed_parts": "no clocks run while a part is compiled",
 }
 
-# Modules without a switch, and the reason.
+# Modules without a switch, with their tasks or the reasons.
 BASES = {
     "atomics": "instructions by which threads share worlds",
     "backend": "the interface of the decorators",
@@ -52,12 +53,12 @@ BASES = {
 
 
 def read_names(text: str) -> frozenset[str]:
-    """Names of optimisations in the value of `VARIABLE`.
+    """Names of the optimisations in a text such as ``ranges,scalars``, the value of `VARIABLE`.
 
     Raises
     ------
     ValueError
-        One of them is unknown.
+        A name is not among `OPTIMISATIONS`.
     """
     names = frozenset(filter(None, (each.strip() for each in text.split(","))))
     if names <= OPTIMISATIONS.keys():
@@ -70,13 +71,13 @@ WITHOUT = read_names(os.environ.get(VARIABLE, ""))
 
 
 def is_on(name: str) -> bool:
-    """True unless an optimisation, one of `OPTIMISATIONS`, is turned off."""
+    """True unless the optimisation of this name, a key of `OPTIMISATIONS`, is turned off."""
     if name not in OPTIMISATIONS:
         raise KeyError(name)
     return name not in WITHOUT
 
 
 def folder_suffix() -> str:
-    """Suffix of the folder of machine code that names the optimisations turned off; empty if all are on."""
+    """Suffix of the folder of machine code, a digest of the optimisations that are off; "" if all are on."""
     names = ",".join(sorted(WITHOUT))
     return f"-without-{hashlib.sha256(names.encode()).hexdigest()[:8]}" if names else ""

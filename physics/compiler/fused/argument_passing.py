@@ -1,8 +1,8 @@
-"""Pass arguments of many words between kernels by address.
+"""Passing of large tuples between kernels by address.
 
-The scratch of many bodies is a tuple of a hundred arrays, seven words each. Numba passes each word as an argument of
-its own. Four in five of all instructions written for a step of bodies took that tuple apart or put it together. Here a
-call passes one address, from which a kernel reads the members that it needs.
+The workspace of bodies that touch is a tuple of a hundred arrays, of seven words each. Numba passes each word as an
+argument of its own, so that four in five instructions of such a step would only take this tuple apart or put it
+together. Here a call passes one address, from which a kernel reads the members that it needs.
 """
 
 from __future__ import annotations
@@ -16,17 +16,19 @@ from numba.core.datamodel.packer import ArgPacker, _flatten, _Unflattener
 from physics.compiler.fused.ablation import is_on
 from physics.compiler.fused.folding_builder import FoldingBuilder, StructInMemory, stack_slot
 
-# A tuple of more is handed on by its address.
+# A tuple of more words than this is passed by its address.
 FEW_WORDS = 64 if is_on("argument_passing") else sys.maxsize
 
 
 class Arguments(ArgPacker):
-    """Numba's arguments of a call, except large tuples.
+    """Packer of the arguments of a call between kernels: as Numba's, but large tuples are passed by address.
 
     Parameters
     ----------
     models : numba.core.datamodel.DataModelManager
+        Numba's models of data types.
     fe_args : sequence of numba.types.Type
+        Types of the arguments.
     """
 
     def __init__(self, models, fe_args):
@@ -39,7 +41,7 @@ class Arguments(ArgPacker):
         self._be_args = list(_flatten(words))
 
     def assign_names(self, args, names):
-        """Name the words, and mark addresses as read-only."""
+        """Name the arguments of an LLVM function, and mark addresses of tuples as neither aliased nor null."""
         super().assign_names(args, names)
         for word in args:
             if isinstance(word.type, ir.PointerType) and word.type in self._addresses:
@@ -47,12 +49,12 @@ class Arguments(ArgPacker):
                     word.add_attribute(attribute)
 
 
-# By the identity of a model of Numba's: the model itself, which so lives as long, and the one of an argument.
+# For each model of Numba, by its identity: the model itself, which is thereby kept alive, and the model of an argument.
 _ARGUMENT_MODELS: dict[int, tuple] = {}
 
 
 def _argument_model(model):
-    """`_ByAddress` for the model of a large tuple, any other model as it is; answers are cached."""
+    """Model of an argument, cached: `_ByAddress` if `model` is that of a large tuple, else `model` itself."""
     known = _ARGUMENT_MODELS.get(id(model))
     if known is None:
         known = _ARGUMENT_MODELS[id(model)] = model, _ByAddress(model) if _is_large(model) else model
@@ -66,7 +68,7 @@ def _is_large(model) -> bool:
 
 
 class _ByAddress:
-    """Model of a tuple argument that is passed as its address."""
+    """Model of an argument for tuples that are passed by address."""
 
     def __init__(self, model):
         self._type = model.get_value_type()
@@ -75,7 +77,7 @@ class _ByAddress:
         return self._type.as_pointer()
 
     def as_argument(self, builder, value):
-        """Address of a value: its present one if it was passed by address itself."""
+        """Address to pass for a tuple: its own if it came by address, else that of a copy on the stack."""
         if isinstance(value, StructInMemory):
             return value.address
         address = stack_slot(builder, self._type)

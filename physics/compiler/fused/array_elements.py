@@ -1,8 +1,8 @@
-"""Elements of arrays, and arrays of records, in as few instructions as possible.
+"""Lowering of array elements, and of arrays in records, to as few LLVM instructions as possible.
 
-Numba lowers elements through memory. To read `a[i, j]` it copies the array's seven words, reads shapes and strides from
-the copy, and multiplies these even for an array of known size. The optimiser removes all of it; here it is not written
-in the first place. All other cases are left to Numba.
+To read `a[i, j]`, Numba copies the array's seven words to memory, reads shape and strides from the copy, and multiplies
+these even for an array of known size. The optimiser would remove all of that. Here these instructions are not written.
+Accesses that are no single elements are left to Numba.
 """
 
 from __future__ import annotations
@@ -23,23 +23,26 @@ from physics.compiler.fused.folding_builder import (
     word_constant,
 )
 
-_ITEM_SIZE, _DATA, _SHAPE, _STRIDES = 3, 4, 5, 6  # members of an array
+_ITEM_SIZE, _DATA, _SHAPE, _STRIDES = 3, 4, 5, 6  # positions of the members of Numba's structure of an array
 
 _COUNTS_FROM_FRONT = is_on("indices_from_front")
 
 
 def _lengths(builder, array_type, array, member, known) -> list:
-    """Shape or strides [bytes] of an array, as constants if its type has them."""
+    """Lengths of the axes of an array, or its strides [bytes], as LLVM values: constants if the type fixes them.
+
+    `member` is `_SHAPE` or `_STRIDES`; `known` reads the same from a type of fixed size.
+    """
     if isinstance(array_type, types.NestedArray):
         return [word_constant(length) for length in known(array_type)]
     return [builder.extract_value(array, (member, axis)) for axis in range(array_type.ndim)]
 
 
 def _from_front(context, builder, index, type_, length):
-    """Index as a word, counted from the front of an axis.
+    """Index as a word that counts from the front of an axis of this length; a negative one counts from the end.
 
-    In kernels only a literal counts from the end: to ask of each index whether it is negative takes 6 % of a heap's
-    time. Functions of users, which are not written with our builder, may count as they like.
+    In kernels only literals may be negative: a test of each index would take 6 % of the time of a heap. In users'
+    functions, which are not lowered with `KernelBuilder`, every index may be negative.
     """
     index = context.cast(builder, index, type_, types.intp if type_.signed else types.uintp)
     known = known_integer(index)
@@ -50,7 +53,10 @@ def _from_front(context, builder, index, type_, length):
 
 
 def element_pointer(context, builder, array_type, array, index_types, indices):
-    """Pointer to an element; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError."""
+    """Pointer to an element of an array; under NUMBA_BOUNDSCHECK=1 an index outside its axis raises IndexError.
+
+    `array` and `indices` are LLVM values, `array_type` and `index_types` their Numba types.
+    """
     shape = _lengths(builder, array_type, array, _SHAPE, lambda known: known.shape)
     data = builder.extract_value(array, _DATA)
     from_front = []
@@ -71,14 +77,14 @@ def element_pointer(context, builder, array_type, array, index_types, indices):
 
 
 def _indices(builder, index_type, index) -> tuple[tuple, list]:
-    """Types and values of the indices in `a[index]`."""
+    """Types and LLVM values of the single indices in `a[index]`, where `index` is a number or a tuple."""
     if isinstance(index_type, types.BaseTuple):
         return tuple(index_type.types), [builder.extract_value(index, k) for k in range(len(index_type))]
     return (index_type,), [index]
 
 
 def _is_element(array_type, index_type) -> bool:
-    """True if `a[index]` is one element, not a view, by the types of array and index."""
+    """True if these types of array and index make `a[index]` a single element, not a view."""
     if not isinstance(array_type, types.Array) or array_type.layout not in "CA":
         return False
     each = index_type.types if isinstance(index_type, types.BaseTuple) else (index_type,)
@@ -86,13 +92,13 @@ def _is_element(array_type, index_type) -> bool:
 
 
 def _read(context, builder, sig, args):
-    """`a[index]`."""
+    """Lower the read of an element, `a[index]`."""
     place = element_pointer(context, builder, sig.args[0], args[0], *_indices(builder, sig.args[1], args[1]))
     return context.unpack_value(builder, sig.args[0].dtype, place, None if sig.args[0].aligned else 1)
 
 
 def _write(context, builder, sig, args):
-    """`a[index] = value`."""
+    """Lower the write of an element, `a[index] = value`."""
     array_type, index_type, value_type = sig.args
     value = context.cast(builder, args[2], value_type, array_type.dtype)
     place = element_pointer(context, builder, array_type, args[0], *_indices(builder, index_type, args[1]))
@@ -100,7 +106,10 @@ def _write(context, builder, sig, args):
 
 
 def _reshape(context, builder, sig, args):
-    """`a.reshape(shape)` of a contiguous array to as many elements; NUMBA_BOUNDSCHECK=1 checks the sizes."""
+    """Lower `a.reshape(shape)` of a contiguous array, without a check that the count of elements is the same.
+
+    Under NUMBA_BOUNDSCHECK=1, and in users' functions, it returns NotImplemented: Numba's lowering checks the count.
+    """
     if context.enable_boundscheck or not isinstance(builder, KernelBuilder):
         return NotImplemented
     array, shape = args
@@ -115,7 +124,7 @@ def _reshape(context, builder, sig, args):
 
 
 def array_in_record(context, builder, record_type, record, name):
-    """Array in a field of a record: all of it is a constant, except its address."""
+    """Lower the read of a record's field that is an array: all words of the array but its address are constants."""
     field = record_type.typeof(name)
     data = cgutils.get_record_member(
         builder, record, record_type.offset(name), context.get_data_type(field.dtype)
@@ -131,13 +140,13 @@ def array_in_record(context, builder, record_type, record, name):
 
 
 def record_in_record(context, builder, record_type, record, name):
-    """Record in a field of a record: its address."""
+    """Lower the read of a record's field that is a record: its address."""
     inner = context.get_data_type(record_type.typeof(name))
     return cgutils.get_record_member(builder, record, record_type.offset(name), inner)
 
 
 def signature(key, context, args) -> typing.Signature | None:
-    """Signature of `a[index]` or `a[index] = number` for an element, or None."""
+    """Signature of the operation `key` for types `args` if it is `a[index]` or `a[index] = number` of an element."""
     if key is operator.getitem and _is_element(*args):
         return typing.signature(args[0].dtype, args[0], _as_words(args[1]))
     if key is operator.setitem and _is_element(*args[:2]) and args[0].mutable:
@@ -148,14 +157,14 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 def _as_words(index: types.Type) -> types.Type:
-    """Type of an index with all of its numbers as words."""
+    """Type of an index, a number or a tuple, with 64-bit words in place of all its numbers."""
     if isinstance(index, types.BaseTuple):
         return types.BaseTuple.from_types(tuple(map(_as_words, index.types)))
     return types.intp if index.signed else types.uintp
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers an element, or a reshaped array."""
+    """Return the function that lowers the operation `key` if it reads or writes an element or reshapes, else None."""
     if key is operator.getitem and _is_element(*sig.args):
         return _read
     if key is operator.setitem and _is_element(*sig.args[:2]):

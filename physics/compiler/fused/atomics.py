@@ -1,4 +1,4 @@
-"""Atomic changes and reads of an array that threads share without a lock, as instructions of the processor."""
+"""Atomic operations on tables of int64 that threads share without a lock, as instructions of the processor."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.compiler.fused.array_elements import element_pointer
 from physics.compiler.fused.folding_builder import WORD, word_constant
 from physics.compiler.fused.prepared_entry import WORD_SIZE
 
-# What a processor is told that waits for another one, where there is such an instruction.
+# LLVM's name and arguments of the instruction for a short wait in a loop, on processors that have one.
 _PAUSES = {
     "x86_64": ("llvm.x86.sse2.pause", ()), "AMD64": ("llvm.x86.sse2.pause", ()),
     "aarch64": ("llvm.aarch64.hint", (1,)), "arm64": ("llvm.aarch64.hint", (1,)),
@@ -20,7 +20,7 @@ _PAUSES = {
 
 
 def _pointer(context, builder, sig, args):
-    """Pointer to table[row, column], from the first three arguments."""
+    """Pointer to the element table[row, column], where `args` begins with table, row and column."""
     return element_pointer(context, builder, sig.args[0], args[0], sig.args[1:3], args[1:3])
 
 
@@ -29,7 +29,10 @@ def _word(context, builder, sig, args, k):
 
 
 def _changed_by(operation: str):
-    """Return the lowering of a change by a number, which returns the old value of the element."""
+    """Make the lowering of an atomic change of an element by a number; the change returns the old value.
+
+    `operation` is LLVM's name of the change, such as ``add``.
+    """
 
     def lower(context, builder, sig, args):
         number = _word(context, builder, sig, args, 3)
@@ -40,19 +43,19 @@ def _changed_by(operation: str):
 
 @intrinsic
 def atomic_add(typing_context, table, row, column, number):
-    """table[row, column] += number; returns the old value."""
+    """Add `number` to table[row, column] atomically; return the old value."""
     return types.int64(table, row, column, number), _changed_by("add")
 
 
 @intrinsic
 def atomic_exchange(typing_context, table, row, column, number):
-    """table[row, column] = number; returns the old value."""
+    """Set table[row, column] to `number` atomically; return the old value."""
     return types.int64(table, row, column, number), _changed_by("xchg")
 
 
 @intrinsic
 def compare_exchange(typing_context, table, row, column, expected, number):
-    """table[row, column] = number if it equals `expected`; returns whether it did."""
+    """Set table[row, column] to `number` if it equals `expected`, atomically; return whether it did."""
 
     def lower(context, builder, sig, args):
         expected, number = (_word(context, builder, sig, args, k) for k in (3, 4))
@@ -64,7 +67,7 @@ def compare_exchange(typing_context, table, row, column, expected, number):
 
 @intrinsic
 def atomic_load(typing_context, table, row, column):
-    """table[row, column] as it is now."""
+    """Read table[row, column] atomically: the value last written by any thread."""
 
     def lower(context, builder, sig, args):
         return builder.load_atomic(_pointer(context, builder, sig, args), "acquire", WORD_SIZE)
@@ -74,7 +77,7 @@ def atomic_load(typing_context, table, row, column):
 
 @intrinsic
 def spin_pause(typing_context):
-    """Wait for a moment."""
+    """Pause the processor for a moment, in a loop that waits for another thread."""
 
     def lower(context, builder, sig, args):
         if platform.machine() in _PAUSES:
@@ -89,7 +92,7 @@ def spin_pause(typing_context):
 
 @intrinsic
 def call_address(typing_context, address):
-    """Call the system's function at the address, without arguments, and return its result; -1 if the address is 0."""
+    """Call the system function at an address, without arguments; return its result, or -1 if the address is 0."""
 
     def lower(context, builder, sig, args):
         function, before = ir.FunctionType(ir.IntType(32), []).as_pointer(), builder.basic_block

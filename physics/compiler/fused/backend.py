@@ -1,4 +1,4 @@
-"""Compile kernels together: the interface of `compiler.decorators`."""
+"""Interface of the fused compiler for `compiler.decorators`: kernels of a step are compiled together."""
 
 from __future__ import annotations
 
@@ -18,24 +18,27 @@ from physics.compiler.fused.atomics import atomic_add  # noqa: F401 (a part of t
 from physics.compiler.fused.dispatcher import FOREIGN_KIND, PART_KIND, SHARED_KIND, Kernel
 from physics.compiler.fused.user_functions import examine  # noqa: F401 (a part of the interface)
 
-# Without Numba's run time (`_nrt`) there are no reference counts to keep, nor can a kernel allocate.
+# Numba's options of all kernels. Without its run time (`_nrt`) there are no reference counts, and no allocation.
 OPTIONS = {"error_model": "numpy", "nogil": True, "_nrt": False}
 
-# Held while something is compiled or loaded.
+# Lock that a thread holds while it compiles or loads a kernel.
 LOCK = global_compiler_lock
 
-# Calls are made in machine code, by the address of a kernel and of its arguments.
+# Whether machine code can make calls, by the addresses of a kernel and of its arguments.
 PREPARES_CALLS = True
 
-# Python's calls of a kernel run machine code.
+# Whether a call of a kernel from Python runs machine code.
 MAKES_MACHINE_CODE = True
 
-# Allocations between two runs of the garbage collector while something is compiled; 0: none.
+# Thresholds of the garbage collector while a kernel is compiled, as of `gc.set_threshold`; 0: it does not run.
 COLLECT_AT = (0, 0, 0) if is_on("paused_gc") else gc.get_threshold()
 
 
 def make(function, called_as=PART_KIND, **options) -> Kernel:
-    """Make a `Kernel` of `function` that is not kept on disk."""
+    """Make a `Kernel` of `function` that is not kept on disk.
+
+    `called_as` is its role when other kernels call it, as of `Kernel`; `options` are Numba's.
+    """
     options = {"nopython": True, "boundscheck": None, **OPTIONS, **options}
     return Kernel(function, options=options, called_as=called_as)
 
@@ -47,10 +50,10 @@ def _kept(function, called_as=PART_KIND, **options) -> Kernel:
 
 
 def part(function) -> Kernel:
-    """Compile a function that other kernels call.
+    """Make a kernel of a function, which other kernels and Python may call.
 
-    The part is marked as not to be inlined. Numba would otherwise inline it if its first caller is inlined, together
-    with all that it calls, one copy for each call.
+    Numba must not inline it. It would otherwise inline the kernel, and all kernels below it, wherever the first caller
+    is inlined, with a copy for each call.
     """
     return _kept(function, forceinline=False)
 
@@ -59,67 +62,67 @@ entry = part
 
 
 def shared_part(function) -> Kernel:
-    """Compile a function with machine code of its own."""
+    """Make a shared kernel of a function: its machine code is compiled once for all kernels that call it."""
     return _kept(function, SHARED_KIND, forceinline=False)
 
 
 def inlined_part(function) -> Kernel:
-    """Compile a function into its callers."""
+    """Make a kernel of a function that is inlined in its callers."""
     return _kept(function, forceinline=True)
 
 
 def runtime_part(function) -> Kernel:
-    """Compile a function into its callers, without a place on disk."""
+    """Make a kernel of a function that is inlined in its callers and not kept on disk alone."""
     return make(function, FOREIGN_KIND, forceinline=True)
 
 
 def user_part(function) -> Kernel:
-    """Compile a user's function into its callers, with checks of its indices."""
+    """Make a kernel of a user's function that is inlined in its callers and checks its indices."""
     return make(function, FOREIGN_KIND, forceinline=True, boundscheck=True)
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Let `choose` pick the function for a call of `stub`, which becomes a part of its caller, with no call left."""
+    """Let `choose` pick, by the types of arguments, the function that replaces each call of `stub`; it is inlined."""
     options = {**OPTIONS, "forceinline": True, "pipeline_class": Kernel.part_pipeline}
     overload(stub, jit_options=options, strict=False)(choose)
     return stub
 
 
 def is_kernel(value) -> bool:
-    """True for the result of a kernel decorator."""
+    """True if a value was made by a decorator of kernels."""
     return isinstance(value, Kernel)
 
 
 def is_none(value) -> bool:
-    """True for None and its type."""
+    """True if a value is None, or Numba's type of None."""
     return value is None or isinstance(value, types.NoneType)
 
 
 def member(group, name: str):
-    """A member of a named tuple, or the type of one in the type of a named tuple or of a record."""
+    """Member `name` of a named tuple; of the type of a named tuple or record, the type of that member."""
     if isinstance(group, types.Record):
         return group.typeof(name)
     return group.types[group.fields.index(name)] if isinstance(group, types.BaseNamedTuple) else getattr(group, name)
 
 
 def record_members(record):
-    """Names of the members of a record, or of the type of one."""
+    """Names of the members of a record, given as a record or as its type."""
     return record.fields if isinstance(record, types.Record) else record.dtype.names
 
 
 def machine_code(kernel: Kernel, arguments: tuple) -> Callable:
-    """Machine code of a kernel for arguments of these types, to be called with such arguments."""
+    """Compile a kernel for arguments of these types; return a function that runs the machine code."""
     return kernel.compile(tuple(map(numba.typeof, arguments)))
 
 
 @intrinsic
 def lend(typing_context, value):
-    """Return the same arrays: kernels count no references anyway."""
+    """Lend arrays to other kernels: here they stay the same values, since kernels count no references."""
     return value(value), lambda context, builder, sig, args: args[0]
 
 
 def renew(function: Dispatcher) -> None:
-    """Drop the compiled code of a function, after a global that it reads has changed."""
+    """Discard the compiled code of a function, after a global that it reads has changed."""
     if isinstance(function, Kernel):
         function.renew()
     else:
@@ -128,6 +131,6 @@ def renew(function: Dispatcher) -> None:
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels compiled during the block; yields a function that returns the number."""
+    """Context manager that counts compilations; it yields a function that returns their present number."""
     with event.install_recorder("numba:compile") as recorder:
         yield lambda: sum(1 for _, what in recorder.buffer if what.is_start)

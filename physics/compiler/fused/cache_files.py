@@ -1,11 +1,11 @@
-"""Files of machine code: each must be complete, of this kernel and of this user, or it is not read.
+"""Files of machine code. A file is read only if it is complete, made for this kernel, and written by this user.
 
-A cache file is unpickled, which can run anything, and its code is then run. So a file begins with a digest of its
-content and of its purpose. It is read only if it belongs to this user or to root, and nobody else may write to it. The
-opened file is tested, whatever folders lead to it. A damaged file is made anew, with a line that says so. If files
-cannot be written, kernels live in memory.
+A cache file is unpickled, which can run any code, and its machine code is then run. So a file begins with a digest of
+its content and of its purpose: the kernel, its sources and the types of arguments. It is read only if it belongs to
+this user or to root, and nobody else may write to it. The opened file itself is checked, so that links do not matter.
+The caller replaces a damaged file and says so. If files cannot be written, machine code stays in memory.
 
-A file is named after a digest of its purpose, so there is no index that two processes could both write.
+The name of a file is a digest of its purpose, so there is no index that two processes could both write.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ DIGEST_SIZE = 32  # [bytes]
 
 
 class DamagedFileError(Exception):
-    """Error about a file with another content than was written."""
+    """Error about a cache file whose content is not the one that was written."""
 
 
 class ForeignFileError(Exception):
-    """Error about a file that another user wrote, or could have written."""
+    """Error about a cache file that another user wrote, or could have written."""
 
 
 def _checksum(purpose: bytes, content: bytes) -> bytes:
@@ -36,12 +36,12 @@ def _checksum(purpose: bytes, content: bytes) -> bytes:
 
 
 def read_cache_file(path: Path, purpose: bytes):
-    """Return the content of a cache file written for this purpose; None if there is no such file.
+    """Read and unpickle a cache file that was written for this purpose; return None if the file does not exist.
 
     Raises
     ------
     DamagedFileError, ForeignFileError
-        With the reason.
+        The file must not be used; the message is the reason.
     OSError
         The file cannot be read.
     """
@@ -60,12 +60,14 @@ def read_cache_file(path: Path, purpose: bytes):
 
 
 def write_cache_file(path: Path, purpose: bytes, pickled: bytes) -> None:
-    """Write a file that appears at once and complete; others may read it if the umask allows.
+    """Write pickled content for a purpose to a cache file, which appears complete or not at all.
+
+    Other users may read the file if the umask allows it.
 
     Raises
     ------
     OSError
-        It cannot be written. Nothing has changed then.
+        The file cannot be written. Nothing has changed then.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.is_dir():

@@ -1,9 +1,9 @@
-"""Calling convention between kernels: arguments by value, and a return value in place of a status.
+"""Calling convention between kernels: a function returns its value instead of a status.
 
-A function compiled by Numba writes its result to a place of its caller, and returns a status. The caller reads the
-status, passes an exception on, and reads the result. Kernels raise no exceptions; only functions of users may. Here a
-part returns its value. A part that may raise is lowered again in Numba's way, and so are its callers, so that the
-exception gets through.
+A function compiled by Numba writes its result to an address that its caller passes, and returns a status. The caller
+reads the status, passes an exception on, and reads the result. Kernels raise no exceptions; only users' functions may.
+So here a part returns its value. A part that may raise is lowered again in Numba's convention, and so are its callers,
+which pass the exception on.
 """
 
 from __future__ import annotations
@@ -17,29 +17,32 @@ from physics.compiler.fused.folding_builder import stack_slot
 
 
 class MayRaise(Exception):
-    """Error of a kernel that should return its value, but may raise an exception, or return None for a number."""
+    """Error while lowering a function that should return its value, but may raise an exception or return None."""
 
 
 def returns_value(function) -> bool:
-    """True if a function, or its descriptor, returns its value instead of a status."""
+    """True if an LLVM function, or a descriptor of one, returns its value instead of a status."""
     return getattr(function, "returns_value", False)
 
 
 class ValueDescriptor(PythonFunctionDescriptor):
-    """Descriptor of a function that returns its value."""
+    """Numba's descriptor of a compiled function, for one that returns its value instead of a status."""
 
     __slots__ = ()
     returns_value = True
 
 
 def declare_value_function(context, module: ir.Module, about) -> ir.Function:
-    """Declare a function that returns its value, in a module that defines or calls it.
+    """Declare a function that returns its value, in an LLVM module that defines or calls it; return the declaration.
 
     Parameters
     ----------
     context : numba.core.base.BaseContext
+        Target context.
     module : llvmlite.ir.Module
+        Module of the declaration.
     about : ValueDescriptor
+        Name and types of the function.
     """
     packer = context.get_arg_packer(about.argtypes)
     result = context.data_model_manager[about.restype].get_return_type()
@@ -54,7 +57,10 @@ def declare_value_function(context, module: ir.Module, about) -> ir.Function:
 
 
 def call_value_function(context, builder, about, args):
-    """Result of a call; an exception passes through, since no kernel catches one."""
+    """Write a call of the function that `about` describes; return its result as an LLVM value.
+
+    An exception of the function leaves the calling function, too, since no kernel catches one.
+    """
     words = context.get_arg_packer(about.argtypes).as_arguments(builder, args)
     if returns_value(about):
         result = builder.call(declare_value_function(context, builder.module, about), words)
@@ -70,38 +76,41 @@ def call_value_function(context, builder, about, args):
 
 
 class ValueCallConv(CPUCallConv):
-    """Numba's convention, and the one of functions that return their value."""
+    """Calling convention with both kinds of function: those that return a status, as Numba's, or their value."""
 
     def must_give_status(self, builder: ir.IRBuilder) -> None:
-        """Raise MayRaise if the function under construction returns its value."""
+        """Raise MayRaise if the function that `builder` writes returns its value, and so cannot report an exception."""
         if returns_value(builder.function):
             raise MayRaise(builder.function.name)
 
     def get_arguments(self, func):
-        """Return the kernel's own arguments among a function's arguments."""
+        """Arguments of an LLVM function that are those of the kernel, without Numba's for result and exception."""
         return func.args if returns_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):
-        """Leave a function with a value."""
+        """Write the instructions that return `retval` from the function that `builder` writes."""
         if returns_value(builder.function):
             builder.ret(retval)
         else:
             super().return_value(builder, retval)
 
     def return_user_exc(self, builder, exc, exc_args=None, loc=None, func_name=None):
-        """Leave a function with an exception; its default place is the user's present statement."""
+        """Write the instructions that leave a function with the exception `exc`.
+
+        By default the exception names the line of the user's present statement.
+        """
         self.must_give_status(builder)
         if loc is None:
             loc, func_name = getattr(builder, "place", (None, func_name))
         super().return_user_exc(builder, exc, exc_args, loc, func_name)
 
     def return_dynamic_user_exc(self, builder, *about, **more):
-        """Leave a function with an exception whose arguments are computed."""
+        """Write the instructions that leave a function with an exception whose arguments are computed at run time."""
         self.must_give_status(builder)
         super().return_dynamic_user_exc(builder, *about, **more)
 
     def return_status_propagate(self, builder, status):
-        """Leave a function with the exception of a call, if it raised one."""
+        """Write the instructions that leave a function with the exception of a call, if `status` is that of one."""
         if status.code is not RETCODE_OK:
             self.must_give_status(builder)
             super().return_status_propagate(builder, status)
@@ -111,7 +120,7 @@ class ValueCallConv(CPUCallConv):
         super()._return_errcode_raw(builder, code)
 
     def call_function(self, builder, callee, resty, argtys, args, attrs=None):
-        """Status and result of a call by Numba's lowering."""
+        """Write a call for Numba's lowering, which expects a status and a result; return both."""
         if not returns_value(callee):
             return super().call_function(builder, callee, resty, argtys, args, attrs)
         words = self.context.get_arg_packer(argtys).as_arguments(builder, args)

@@ -1,4 +1,4 @@
-"""Code libraries of kernels: IR of parts, machine code of entry kernels and shared ones (`dispatcher`).
+"""Code libraries of kernels: LLVM IR of parts, machine code of wholes and shared kernels (terms of `dispatcher`).
 
 The private part of Numba used here is `JITCodeLibrary`, the IR of one function with the libraries that it calls.
 """
@@ -14,12 +14,14 @@ from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
 
 class KernelOrigin(NamedTuple):
-    """Origin of shared machine code: a kernel, and the types of its arguments.
+    """Origin of the machine code of a shared kernel: the kernel, and the types of its arguments.
 
     Parameters
     ----------
     module, name : str
+        Names of the kernel and of its module.
     args : tuple of numba.types.Type
+        Types of the arguments.
     """
 
     module: str
@@ -27,15 +29,15 @@ class KernelOrigin(NamedTuple):
     args: tuple
 
     def load(self) -> None:
-        """Load the machine code into memory."""
+        """Load the machine code of the kernel into memory, from disk or by compiling it."""
         getattr(importlib.import_module(self.module), self.name).stand(self.args)
 
 
 class PartLibrary(JITCodeLibrary):
-    """IR of one part, neither linked nor optimised."""
+    """Library of a part, a kernel that other kernels call: its LLVM IR, neither linked nor optimised."""
 
     def add_ir_module(self, ir_module):
-        """Add a module; it is the same in every whole that calls the part."""
+        """Take the LLVM module of the part; several wholes may link it, so its functions may be defined repeatedly."""
         for function in ir_module.functions:
             if not function.is_declaration:
                 function.linkage = "linkonce_odr"
@@ -50,15 +52,15 @@ class PartLibrary(JITCodeLibrary):
 
 
 class WholeLibrary(JITCodeLibrary):
-    """IR of a whole, linked with that of every part below it before it is optimised.
+    """Library of a whole, a kernel that Python calls: its IR is linked with that of all parts below it and optimised.
 
-    Its parts are its own. Two wholes on disk may have parts of one name that differ, made by two processes; a third
-    process that loads both would run one part in both.
+    The symbols of its parts are internal. Otherwise a process that loads two wholes from disk, made by two other
+    processes, could run a part of one whole in the other where different parts have the same name.
 
     Attributes
     ----------
     called : tuple of KernelOrigin
-        The kernels that stand, of those below it.
+        Shared kernels that the whole calls, directly or through its parts.
     """
 
     called: tuple[KernelOrigin, ...] = ()
@@ -77,30 +79,33 @@ class WholeLibrary(JITCodeLibrary):
 
 
 class SharedLibrary(WholeLibrary):
-    """Machine code of a shared kernel, called by symbol.
+    """Library of a shared kernel: machine code that wholes call by symbol.
 
     Attributes
     ----------
     origin : KernelOrigin
-        What it was made of.
+        Kernel and types of arguments of the machine code.
     """
 
     origin: KernelOrigin
 
     def machine_code(self) -> bytes:
-        """Machine code in its form on disk."""
+        """Machine code of the kernel as an object file, to be kept on disk."""
         self._ensure_finalized()
         return self._get_compiled_object()
 
     def take(self, machine_code: bytes) -> None:
-        """Take machine code from disk."""
+        """Take over machine code that was read from disk, in the form that the method `machine_code` returns."""
         self.enable_object_caching()
         self._set_compiled_object(machine_code)
         self._finalize_final_module()
 
 
 def _callers_first(whole: WholeLibrary) -> list[CodeLibrary]:
-    """Every library below `whole` once, after all of its callers: the linker drops uncalled functions."""
+    """List the libraries of all kernels below `whole`, each once and after its callers.
+
+    This order matters, since the linker drops functions that nothing calls yet.
+    """
     callees_first: dict[CodeLibrary, None] = {}
 
     def visit(library):

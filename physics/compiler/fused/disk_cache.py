@@ -1,6 +1,6 @@
-"""Machine code of wholes and shared kernels on disk (`dispatcher`).
+"""Caches on disk of the machine code of wholes and shared kernels (terms of `dispatcher`).
 
-A file names the shared kernels that its code calls; they are loaded before it.
+A file lists the shared kernels that its code calls; these are loaded first.
 """
 
 from __future__ import annotations
@@ -26,13 +26,14 @@ from physics.compiler.notices import warn, warn_once
 
 
 class _Cache:
-    """Machine codes of one kernel on disk, in place of Numba's cache.
+    """Cache of one kernel's machine code on disk, a file for each signature; it replaces Numba's cache.
 
     Parameters
     ----------
     function : Callable
+        Python function of the kernel.
     folder : Path or None
-        None: nothing is kept.
+        Folder of the files; None: nothing is kept.
     """
 
     kind = ""
@@ -40,27 +41,27 @@ class _Cache:
     def __init__(self, function, folder: Path | None):
         self._function, self._source = function, Path(inspect.getfile(function))
         self.cache_path = folder
-        self._is_enabled = folder is not None and self._source.exists()  # else it was typed in
+        self._is_enabled = folder is not None and self._source.exists()  # a function typed into a shell has no file
 
     def enable(self):
-        """Use the disk."""
+        """Use the disk, if there is a folder and the function is from a file."""
         self._is_enabled = self.cache_path is not None and self._source.exists()
 
     def disable(self):
-        """Stop using the disk."""
+        """Stop using the disk: neither load nor keep machine code."""
         self._is_enabled = False
 
     def flush(self):
-        """Drop everything kept of this kernel."""
+        """Delete all files of this kernel."""
         for path in self.cache_path.glob(f"{self._name}.*.nbc") if self._is_enabled else ():
             path.unlink(missing_ok=True)
 
     def load_overload(self, sig, target_context):
-        """Machine code for the types `sig` of arguments; None without a usable one.
+        """Load the machine code for the types `sig` of arguments; None if no usable file exists.
 
-        Numba's own cache refreshes the context here, which imports SciPy and takes four times as long as to read a
-        step. This one does not: machine code needs nothing of the context, since kernels have no run time of Numba
-        (`_nrt` of `backend`). Where a kernel is compiled after all, `CompilerBase` refreshes it.
+        Numba's own cache would refresh the target context first, which imports SciPy and takes four times as long as
+        loading a step. That is not needed: machine code of kernels uses nothing of the context, as kernels have no run
+        time of Numba (`_nrt` in `backend`). If a kernel must be compiled, `CompilerBase` refreshes the context.
         """
         if not self._is_enabled:
             return None
@@ -70,24 +71,27 @@ class _Cache:
             return None if payload is None else self.rebuild(target_context, payload)
         except cache_files.ForeignFileError as reason:
             warn_once("foreign", f"{path} is not read, since {reason}: kernels are compiled in memory")
-        except Exception as error:  # whatever is wrong with it, the kernel can be compiled
+        except Exception as error:  # any fault of the file: the kernel is compiled instead
             warn(f"{path} is damaged ({type(error).__name__}: {str(error)[:200]}): compiled anew")
         return None
 
     def one_process(self, sig, target_context) -> AbstractContextManager[None]:
-        """Hold the right to compile for the types `sig` of arguments, if that may be kept (`one_process`)."""
+        """Context manager in which no other process compiles the kernel for the types `sig` of arguments.
+
+        See the module `one_process`. It does nothing if nothing is kept on disk, or if the file exists.
+        """
         if not self._is_enabled:
             return nullcontext()
         path, _ = self._place(sig, target_context.codegen())
         return nullcontext() if path.is_file() else one_process(path)
 
     def save_overload(self, sig, made):
-        """Keep machine code, if that is possible."""
+        """Write the compiled kernel `made` for the types `sig` of arguments to disk, if that is possible."""
         if not self._is_enabled or made.library.has_dynamic_globals:
             return
         path, purpose = self._place(sig, made.codegen)
         if path.is_file() and not is_owned_by_user(path.stat()):
-            return  # somebody else's, who would find it changed
+            return  # another user's file, which must not be replaced
         try:
             cache_files.write_cache_file(path, purpose, dumps(self.reduce(made)))
         except OSError as error:
@@ -103,7 +107,7 @@ class _Cache:
 
     @cached_property
     def _about(self) -> bytes:
-        """Return the settings, besides argument types and processor, on which machine code depends."""
+        """Digests of everything but argument types and processor on which the machine code depends."""
         function = self._function
         around = dumps(tuple(cell.cell_contents for cell in function.__closure__)) if function.__closure__ else b""
         versions = (sys.version_info[:3], sys.abiflags if hasattr(sys, "abiflags") else "", numba.__version__)
@@ -112,16 +116,17 @@ class _Cache:
         return b"".join(hashlib.sha256(part).digest() for part in parts)
 
     def _place(self, sig, codegen) -> tuple[Path, bytes]:
-        """File of machine code, and its purpose."""
+        """File of the machine code for the types `sig` of arguments, and its purpose (`cache_files`)."""
         purpose = self._about + repr((str(sig), codegen.magic_tuple())).encode()
         return self.cache_path / f"{self._name}.{hashlib.sha256(purpose).hexdigest()[:24]}.nbc", purpose
 
 
 @cache
 def _place_of(source: Path) -> bytes:
-    """Tell a source from others of the same content: of our packages, by what stands around it and not by its place.
+    """Identify the place of a source file, since files with equal content may import different modules.
 
-    `cache_folder.folder_name` has a digest of what stands around most kernels of `physics`.
+    A file in one of `PACKAGES` is identified by its path within the package and by a digest of its folder, so that the
+    place of installation does not matter. For files in `SOURCES`, `cache_folder.folder_name` has that digest already.
     """
     source = source.resolve()
     for package in PACKAGES:
@@ -138,14 +143,14 @@ def _digest_of_file(path: Path) -> bytes:
 
 
 class WholeCache(_Cache):
-    """Cache of the wholes of one kernel: each with its shared kernels, and Numba's data."""
+    """Cache of a kernel as Python calls it; a file holds the origins of its shared kernels, and Numba's data."""
 
     def reduce(self, made):
-        """Return the content of the file."""
+        """Content of the file for the compiled kernel `made`."""
         return made.library.called, made._reduce()
 
     def rebuild(self, target_context, payload):
-        """Make the whole from the content of its file."""
+        """Make the compiled kernel from the content of its file, after loading the shared kernels that it calls."""
         called, kept = payload
         for origin in called:
             origin.load()
@@ -153,19 +158,19 @@ class WholeCache(_Cache):
 
 
 class SharedCache(_Cache):
-    """Cache of a shared kernel's machine codes, without IR, since nothing is linked with it."""
+    """Cache of a kernel as a shared one; a file holds its machine code, but no LLVM IR, which nobody links later."""
 
-    kind = "-standing"  # its file is not that of the whole of the same kernel
+    kind = "-standing"  # suffix that distinguishes its files from those of the whole of the same kernel
 
     def reduce(self, made):
-        """Return the content of the file."""
+        """Content of the file for the compiled kernel `made`."""
         library, about = made.library, made.fndesc
         code = library.machine_code()
         about.typemap = about.calltypes = None
         return library.called, library.origin, code, about, made.signature
 
     def rebuild(self, target_context, payload):
-        """Make the kernel from the content of its file."""
+        """Make the compiled kernel from the content of its file, after loading the shared kernels that it calls."""
         called, origin, code, about, signature = payload
         for each in called:
             each.load()
@@ -179,7 +184,11 @@ class SharedCache(_Cache):
 
 
 def register_library(target_context, about, environment, library):
-    """Register a kernel with Numba, which identifies functions by entry points, under one that must not be called."""
+    """Register a part or shared kernel with Numba, so that other kernels can call it; return its entry point.
+
+    Numba identifies compiled functions by their entry points. The one made here only serves this; it must not be
+    called.
+    """
     entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
     target_context.insert_user_function(entry, about, [library])
     return entry

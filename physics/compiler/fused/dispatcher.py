@@ -1,7 +1,7 @@
-"""Dispatchers that compile kernels together: each to LLVM IR once, all of them to machine code once.
+"""Dispatchers that compile kernels together: each kernel to LLVM IR once, all kernels of a step to machine code once.
 
-Numba's own dispatcher optimises a kernel and compiles it to machine code as soon as it is typed. It does so once more
-in every caller that the kernel is linked into, up to a dozen levels of a step. Here a kernel has one of three roles:
+Numba's own dispatcher optimises a kernel and compiles it to machine code as soon as its types are known. It does so
+again in every caller, at up to a dozen levels of a step. Here a kernel has one of three roles:
 
 - A *part* is called from other kernels. It is lowered to IR and no further.
 - A *whole* is called from Python. It links all parts below it, is optimised and compiled to machine code, and is kept
@@ -9,21 +9,21 @@ in every caller that the kernel is linked into, up to a dozen levels of a step. 
 - A *shared* kernel is compiled once per signature, with all parts below it, and kept on disk beside the wholes. All
   wholes call it by symbol.
 
-Nothing outside a whole can call its parts, and the optimiser is told so. It drops arguments that a part does not read,
-and inlines a part with one caller. The scratch of many bodies is a hundred arrays of seven words each, of which a part
-reads a dozen. With all of them on the stack calls took a third of a step.
+Nothing outside a whole can call its parts, and the optimiser knows that. So it drops arguments that a part does not
+read, and inlines a part with one caller. The workspace of bodies that touch is a hundred arrays of seven words each, of
+which a part reads a dozen. With all of them on the stack calls would take a third of a step.
 
-The optimiser sees nothing across the call of a shared kernel. But without shared kernels each plan would compile its
-solvers once more. So a kernel is shared if it is large, does not depend on the plan, and takes long or is seldom
+The optimiser cannot optimise across the call of a shared kernel. But without shared kernels each plan would compile its
+own copy of the solvers. So a kernel is shared if it is large, does not depend on the plan, and takes long or is seldom
 needed.
 
-A symbol is named after its function and the types of its arguments. Numba names a record type by a number that counts
-the types of the process. So two processes may give the same names to machine code for two different records, and a
-third process that loads both from disk would run the shared kernels of one in the other. Here a digest of the types is
-part of each name. The parts of a whole are its own (`code_libraries.WholeLibrary`).
+The symbol of a kernel is named after its function and the types of its arguments. Numba names a record type by a number
+that counts the types of the process. So two processes could give the same symbol to machine code for two different
+records, and a third process that loads both from disk would run the shared kernels of one in the other. Here each
+symbol contains a digest of the types. The symbols of parts are internal to a whole (`code_libraries.WholeLibrary`).
 
-`pipeline_class` is Numba's documented way to change the passes of a function. Code that needs private parts of Numba
-stands in `code_libraries` and `disk_cache`.
+`pipeline_class` is Numba's documented way to change the passes of a function. Private parts of Numba are used in
+`code_libraries` and `disk_cache`.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from physics.compiler.fused.passes import kernel_passes, numbas_passes
 
 
 class _Flags(Flags):
-    """Flags of a compilation, whose part of a symbol's name includes a digest of the types of arguments."""
+    """Numba's flags of a compilation, with a digest of the types of arguments that becomes part of the symbol."""
 
     types = ""
 
@@ -57,10 +57,10 @@ class _Flags(Flags):
 
 
 class _WholeCompiler(CompilerBase):
-    """Compiler of a whole: the passes of `kernel_passes`, into a `WholeLibrary`."""
+    """Compiler of a whole, a kernel that Python calls: it runs the passes of `kernel_passes` to a `WholeLibrary`."""
 
     library_class: type[JITCodeLibrary] = WholeLibrary
-    is_entered = True  # from outside: see `prepared_entry`
+    is_entered = True  # whether it gets an entry for calls from outside: see `prepared_entry`
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
         flags = _Flags(flags)
@@ -70,7 +70,7 @@ class _WholeCompiler(CompilerBase):
         self.state.flags.no_cfunc_wrapper = not self.is_entered
 
     def passes(self) -> PassManager:
-        """Passes that are run one after another."""
+        """Sequence of the passes that compile the kernel."""
         return kernel_passes(self.state, WholeLowering)
 
     def define_pipelines(self):
@@ -82,7 +82,7 @@ class _WholeCompiler(CompilerBase):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _KeepAsPart(LoweringPass):
-    """Register a part with Numba."""
+    """Last pass of the compilation of a part: it registers the part with Numba, so that other kernels can call it."""
 
     _name = "keep_as_part"
 
@@ -98,7 +98,7 @@ class _KeepAsPart(LoweringPass):
 
 
 class _PartCompiler(_WholeCompiler):
-    """Compiler of a part: it stops at LLVM IR."""
+    """Compiler of a part, a kernel that other kernels call: it stops at LLVM IR."""
 
     library_class = PartLibrary
     is_entered = False
@@ -115,7 +115,7 @@ class _PartCompiler(_WholeCompiler):
 
 
 class _SharedCompiler(_PartCompiler):
-    """Compiler of a shared kernel, under a symbol that is the same in all processes that call it."""
+    """Compiler of a shared kernel, whose symbol is the same in all processes."""
 
     library_class = SharedLibrary
 
@@ -128,19 +128,19 @@ class _SharedCompiler(_PartCompiler):
 
 
 class _AnyPartCompiler(_PartCompiler):
-    """Compiler of a function that is no kernel, by Numba's own pipeline."""
+    """Compiler of a part that may contain any Python that Numba knows, as users' functions do: Numba's own passes."""
 
     def passes(self):
         return numbas_passes(self.state, {NativeLowering: UserLowering}, _KeepAsPart)
 
 
 class _Part(CPUDispatcher):
-    """A kernel that other kernels call."""
+    """Dispatcher of a kernel in its role as a part of other kernels."""
 
     def compile(self, sig):
-        """Compile it for the types of its arguments, without the two timers that Numba starts for each compilation.
+        """Compile the kernel for the types `sig` of arguments, without the two timers of Numba; return its entry point.
 
-        Nested timers report every call of LLVM to each other.
+        Numba starts these timers for each compilation; nested ones would report every call of LLVM to each other.
         """
         if not is_on("untimed_parts"):
             return super().compile(sig)
@@ -153,14 +153,14 @@ class _Part(CPUDispatcher):
 
 
 class _Shared(_Part):
-    """A kernel that other kernels call, with machine code of its own."""
+    """Dispatcher of a shared kernel, which other kernels call and which has machine code of its own."""
 
     def enable_caching(self, folder=None):
-        """Keep the machine code on disk, in a folder."""
+        """Keep the machine code in files of this folder; None: nowhere."""
         self._cache = SharedCache(self.py_func, folder)
 
     def compile(self, sig):
-        """Load the machine code for the types of its arguments from disk, or compile it."""
+        """Load the machine code for the types `sig` of arguments from disk, or compile it; return its entry point."""
         args, _ = normalize_signature(sig)
         if args not in self.overloads:
             with global_compiler_lock:
@@ -172,7 +172,7 @@ class _Shared(_Part):
         return self.overloads[args].entry_point
 
     def _compile_here(self, args):
-        """Compile it and keep it on disk, unless another process has done so meanwhile."""
+        """Compile the kernel for these types of arguments and keep it on disk, unless another process does so first."""
         with self._cache.one_process(args, self.targetctx):
             kept = self._cache.load_overload(args, MemoisedTarget(self.targetctx))
             if kept is None:
@@ -184,21 +184,22 @@ class _Shared(_Part):
 
 PART_KIND = _Part, _PartCompiler
 SHARED_KIND = (_Shared, _SharedCompiler) if is_on("shared_kernels") else PART_KIND
-FOREIGN_KIND = CPUDispatcher, _AnyPartCompiler  # may be more than a kernel is, and is only called from kernels
+FOREIGN_KIND = CPUDispatcher, _AnyPartCompiler  # part that may contain any Python that Numba knows
 
 
 class Kernel(CPUDispatcher):
-    """A function compiled for the types of its arguments: a whole for Python, a part for other kernels.
+    """Dispatcher of a kernel, compiled for the types of its arguments: a whole for Python, a part for other kernels.
 
     Parameters
     ----------
     function : Callable
+        Python function to compile.
     local_types : dict, optional
-        Must be empty; Numba passes it.
+        Types of local variables, which Numba passes; it must be empty.
     options : dict
-        Numba's options, as of `numba.njit`.
+        Options of `numba.njit`.
     called_as : tuple
-        Its role when other kernels call it: `PART_KIND`, `FOREIGN_KIND` or `SHARED_KIND`.
+        Role of the kernel when other kernels call it: `PART_KIND`, `FOREIGN_KIND` or `SHARED_KIND`.
     """
 
     part_pipeline = _PartCompiler
@@ -210,18 +211,21 @@ class Kernel(CPUDispatcher):
         self._part = self._make_part()
 
     def renew(self) -> None:
-        """Drop the code compiled for other kernels, after a global that the function reads has changed."""
+        """Discard the code compiled for other kernels, after a global that the function reads has changed."""
         self._part = self._make_part()
         MemoisedTarget.forget(types.Dispatcher(self))
 
     def enable_caching(self, folder=None):
-        """Keep its machine code on disk, in a folder."""
+        """Keep the machine code in files of this folder; None: nowhere."""
         self._cache = WholeCache(self.py_func, folder)
         if isinstance(self._part, _Shared):
             self._part.enable_caching(folder)
 
     def compile(self, sig):
-        """Load the machine code for the types of its arguments from disk, or compile it, in one process of several."""
+        """Load the machine code for the types `sig` of arguments from disk, or compile it; return its entry point.
+
+        If several processes need it at the same time, one compiles it and the others load its file.
+        """
         args, _ = normalize_signature(sig)
         if args in self.overloads or not isinstance(self._cache, WholeCache):
             return super().compile(sig)
@@ -229,23 +233,27 @@ class Kernel(CPUDispatcher):
             return super().compile(sig)
 
     def stand(self, args: tuple) -> None:
-        """Compile the machine code that other kernels call, for these types of arguments."""
+        """Load or compile the code that other kernels call, for these types of arguments."""
         self._part.compile(args)
 
     def as_part(self, args: tuple):
-        """Compile it for other kernels and these types of arguments; return Numba's result.
+        """Compile the kernel as a part, for these types of arguments; return Numba's result of the compilation.
 
         Raises
         ------
         Exception
-            In Numba's words: the function cannot be compiled for them.
+            Numba's exception if the function cannot be compiled for these types.
         """
         self._part.compile(args)
         return self._part.overloads[args]
 
     def ready_entry(self, machine_code) -> int:
-        """Address of the entry for other machine code (`prepared_entry`) of a kernel that returns nothing."""
-        with global_compiler_lock:  # what another thread has linked so far is not to be loaded
+        """Address of the kernel's prepared entry (see the module `prepared_entry`).
+
+        `machine_code` is a result of `compile`, which selects the types of the arguments. TypeError if the kernel
+        returns a value.
+        """
+        with global_compiler_lock:  # no other thread may be linking machine code meanwhile
             made = next(made for made in self.overloads.values() if made.entry_point is machine_code)
             entry = made.library.get_pointer_to_function(made.fndesc.llvm_cfunc_wrapper_name)
         if entry == 0:
@@ -253,9 +261,9 @@ class Kernel(CPUDispatcher):
         return entry
 
     def get_call_template(self, args, kws):
-        """Return the template by which another kernel calls this one."""
+        """Numba's template, with which another kernel types a call of this one for arguments of these types."""
         return self._part.get_call_template(args, kws)
 
     def get_overload(self, sig):
-        """Return the function that another kernel calls."""
+        """Numba's entry point, with which another kernel lowers a call of this one."""
         return self._part.get_overload(sig)

@@ -1,8 +1,8 @@
-"""Builder of a kernel's instructions that folds those with known results.
+"""Builders of a kernel's LLVM instructions, which leave out instructions whose results are known.
 
-Numba passes structures on (an array is one of seven words). It inserts a word, extracts another, and leaves it to LLVM
-to find out that nothing happened. Writing, reading and removing such instructions was most of the compile time of a
-kernel.
+In Numba many values are structures; an array has seven words. Numba inserts words into them and extracts others, and
+leaves it to LLVM to find that nothing is computed. Most of the compile time of a kernel would go into writing, reading
+and removing such instructions.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numba.core import cgutils
 from physics.compiler.fused.ablation import is_on
 
 WORD = ir.IntType(64)
-NO_SIGNED_WRAP = ("nsw",)  # no index and no number of a range is beyond what a word holds
+NO_SIGNED_WRAP = ("nsw",)  # LLVM's promise that a result fits into a word, as all indices and numbers of ranges do
 
 
 def _position(indices) -> tuple[int, ...]:
@@ -21,12 +21,12 @@ def _position(indices) -> tuple[int, ...]:
 
 
 class StructInMemory:
-    """Structure in read-only memory of which nothing has been read yet.
+    """Structure in read-only memory, whose members are read only when they are needed.
 
     Parameters
     ----------
     address : llvmlite.ir.Value
-        Pointer to it.
+        Pointer to the structure.
     """
 
     def __init__(self, address):
@@ -35,7 +35,7 @@ class StructInMemory:
         self._members: dict[int, StructInMemory | ir.Value] = {}
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """Member of the structure, read once at the entry of the function unless it is a structure itself."""
+        """Member number `k`: a value that is read at the entry of the function, or a `StructInMemory`."""
         if k not in self._members:
             with builder.goto_entry_block():
                 address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
@@ -44,23 +44,24 @@ class StructInMemory:
         return self._members[k]
 
     def read(self, builder: ir.IRBuilder):
-        """Whole structure as a value."""
+        """Read the whole structure as one LLVM value."""
         return ir.IRBuilder.load(builder, self.address)
 
 
 def member_type(type_: ir.Type, k: int) -> ir.Type:
-    """Type of a member of a structure."""
+    """LLVM type of member number `k` of a structure of this type."""
     return type_.gep(ir.Constant(ir.IntType(32), k))
 
 
 class StructByMembers:
-    """Structure known by its members; it is built as one value only where all of it is needed.
+    """Structure known by its members; it becomes one LLVM value only where the whole is needed.
 
     Parameters
     ----------
     type_ : llvmlite.ir.Type
+        Type of the structure.
     members : sequence
-        Of values, structures, and None for what is not defined.
+        A value or structure for each member; None for an undefined member.
     """
 
     def __init__(self, type_: ir.Type, members):
@@ -68,18 +69,18 @@ class StructByMembers:
         self._members = tuple(members)
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """Member of the structure."""
+        """Member number `k`, as an LLVM value or a structure."""
         return ir.Constant(member_type(self.type, k), ir.Undefined) if self._members[k] is None else self._members[k]
 
     def changed(self, builder: ir.IRBuilder, value, position: tuple[int, ...]):
-        """Structure with one member, or member of a member, replaced."""
+        """Copy of the structure in which the member at `position` is `value`; `position` may lead into a member."""
         k, *within = position
         if within:
             value = builder.insert_value(self.member(builder, k), value, within)
         return StructByMembers(self.type, (*self._members[:k], value, *self._members[k + 1 :]))
 
     def read(self, builder: ir.IRBuilder):
-        """Whole structure as a value."""
+        """Build the whole structure as one LLVM value."""
         members = [_as_value(builder, self.member(builder, k)) for k in range(len(self._members))]
         whole = ir.Constant(self.type, [m if _is_constant(m) else ir.Constant(m.type, ir.Undefined) for m in members])
         for k, member in enumerate(members):
@@ -89,7 +90,7 @@ class StructByMembers:
 
 
 def make_struct(builder: ir.IRBuilder, type_: ir.Type, members):
-    """Make a structure of these members, for our builder or Numba's."""
+    """Make a structure of these members: a `StructByMembers` for a `FoldingBuilder`, else an LLVM value."""
     structure = StructByMembers(type_, members)
     return structure if isinstance(builder, FoldingBuilder) else structure.read(builder)
 
@@ -99,7 +100,7 @@ def _is_constant(value) -> bool:
 
 
 def _split_constant(value):
-    """Members of a constant structure; anything else as it is."""
+    """Constant structure as `StructByMembers`; any other value unchanged."""
     if not _is_constant(value) or not isinstance(value.type, ir.Aggregate):
         return value
     known = value.constant if isinstance(value.constant, (list, tuple)) else None
@@ -109,19 +110,22 @@ def _split_constant(value):
 
 
 class KernelBuilder(ir.IRBuilder):
-    """LLVM's builder, with `fused_multiply_add`."""
+    """LLVM's builder of instructions, which rounds a product in a sum together with the sum (`fused_multiply_add`)."""
 
     if is_on("fused_products"):
 
         def fadd(self, lhs, rhs, name="", flags=()):
-            """Sum of numbers, or of lanes. A product in it is `fused_multiply_add`, of two the second."""
+            """Write the sum of two floats or lanes; if one is a product it is fused, and of two products the second."""
             left, right = _factors(lhs), _factors(rhs)
             if right:
                 return fused_multiply_add(self, *right, lhs)
             return fused_multiply_add(self, *left, rhs) if left else super().fadd(lhs, rhs, name, flags)
 
         def fsub(self, lhs, rhs, name="", flags=()):
-            """Difference of numbers, or of lanes: one product is fused; of two none, so that equal ones leave 0."""
+            """Write the difference of two floats or lanes; a single product in it is fused.
+
+            Of two products none is fused, so that the difference of equal products is exactly 0.
+            """
             left, right = _factors(lhs), _factors(rhs)
             if bool(left) == bool(right):
                 return super().fsub(lhs, rhs, name, flags)
@@ -133,10 +137,10 @@ class KernelBuilder(ir.IRBuilder):
 
 
 class FoldingBuilder(KernelBuilder):
-    """`KernelBuilder` with structures known by their members, and constants folded."""
+    """`KernelBuilder` that knows structures by their members, and computes with constants while it writes."""
 
     def extract_value(self, agg, idx, name=""):
-        """Member of a structure: the value that was inserted, if that is known."""
+        """Read a member of a structure: the value that was inserted if it is known, else by an instruction."""
         position = _position(idx)
         agg = _split_constant(agg)
         while position and isinstance(agg, (StructInMemory, StructByMembers)):
@@ -144,30 +148,30 @@ class FoldingBuilder(KernelBuilder):
         return super().extract_value(agg, position, name) if position else agg
 
     def insert_value(self, agg, value, idx, name=""):
-        """Structure with one member replaced."""
+        """Copy of a structure in which the member at `idx` is `value`."""
         agg = _split_constant(agg)
         if isinstance(agg, StructByMembers):
             return agg.changed(self, value, _position(idx))
         return super().insert_value(_as_value(self, agg), _as_value(self, value), _position(idx), name)
 
     def store(self, value, ptr, align=None):
-        """Write a value."""
+        """Write the instruction that stores a value, possibly a structure, at the address `ptr`."""
         return super().store(_as_value(self, value), ptr, align)
 
     def call(self, fn, args, *more, **named):
-        """Call a function."""
+        """Write the instruction that calls the LLVM function `fn` with the values `args`."""
         return super().call(fn, [_as_value(self, each) for each in args], *more, **named)
 
     def select(self, cond, lhs, rhs, *more, **named):
-        """One of two values."""
+        """Write the instruction that chooses `lhs` if `cond` is true, else `rhs`."""
         return super().select(cond, _as_value(self, lhs), _as_value(self, rhs), *more, **named)
 
     def ret(self, value):
-        """Leave the function with a value."""
+        """Write the instruction that returns a value from the function."""
         return super().ret(_as_value(self, value))
 
     def mul(self, lhs, rhs, name="", flags=()):
-        """Product of integers."""
+        """Return the product of two integers: a known value if both are constants or one is 1, else an instruction."""
         if _is(lhs, 1):
             return rhs
         if _is(rhs, 1):
@@ -177,7 +181,7 @@ class FoldingBuilder(KernelBuilder):
         return super().mul(lhs, rhs, name, flags)
 
     def add(self, lhs, rhs, name="", flags=()):
-        """Sum of integers."""
+        """Return the sum of two integers: a known value if both are constants or one is 0, else an instruction."""
         if _is(lhs, 0):
             return rhs
         if _is(rhs, 0):
@@ -188,21 +192,21 @@ class FoldingBuilder(KernelBuilder):
 
 
 def kernel_builder(block: ir.Block) -> KernelBuilder:
-    """Builder of a kernel's instructions, at the end of a block."""
+    """Make the builder of a kernel's instructions, which writes at the end of a block."""
     return FoldingBuilder(block) if is_on("folding_builder") else KernelBuilder(block)
 
 
 def _factors(value) -> tuple:
-    """Factors of a product of numbers or lanes; none of anything else."""
+    """Factors of a value that is a product of 64-bit floats or lanes; an empty tuple for other values."""
     is_product = isinstance(value, ir.Instruction) and value.opname == "fmul"
     return tuple(value.operands) if is_product and value.type != ir.FloatType() else ()
 
 
 def fused_multiply_add(builder, a, b, c):
-    """a b + c, rounded once: one instruction, and the same to the last bit on every processor.
+    """Write a b + c, rounded once, for floats or lanes: an instruction with the same bits on every processor.
 
-    The instruction is chosen here instead of by LLVM (its flag `contract`). LLVM would fuse in one kernel and not in
-    another, depending on the rest of the kernel.
+    LLVM could choose the instruction itself (its flag `contract`). But it would fuse in one kernel and not in another,
+    depending on the rest of the kernel.
     """
     width = f"v{c.type.count}" if isinstance(c.type, ir.VectorType) else ""
     type_ = ir.FunctionType(c.type, [c.type] * 3)
@@ -222,16 +226,16 @@ def _is(value, number: int) -> bool:
 
 
 def word_constant(value: int) -> ir.Constant:
-    """Constant word."""
+    """LLVM constant of a 64-bit word."""
     return ir.Constant(WORD, value)
 
 
 def known_integer(value):
-    """Integer of a constant value, or None."""
+    """Integer that an LLVM value is, if it is an integer constant; else None."""
     return value.constant if _is_number(value) else None
 
 
 def stack_slot(builder: ir.IRBuilder, type_: ir.Type):
-    """Memory of a variable for the run of its function, uninitialised."""
+    """Reserve uninitialised memory for a value of this type on the stack of the function; return its address."""
     with builder.goto_entry_block():
         return builder.alloca(type_)

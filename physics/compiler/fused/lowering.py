@@ -1,11 +1,11 @@
 """Lowering of a kernel's statements to LLVM IR, without Numba's reference counts.
 
-Kernels own nothing (`physics.compiler.decorators`), so no variable has to be released, or kept for a release.
-Numba's lowering reads the old value of a variable before each assignment, and reads and clears it at the end of its
-life; an array has seven words to read and to clear. A third of all instructions did only this.
+Kernels own no memory (`physics.compiler.decorators`), so no variable must be released. Numba's lowering reads the old
+value of a variable before each assignment, and reads and clears it at the end of its life; for an array these are seven
+words. A third of all instructions would only do this.
 
-In single assignment form a variable that is assigned once is a value: wherever it is used, its assignment has been
-passed. Numba makes it one only if it is used in a single block, and gives it memory otherwise.
+In single assignment form a variable that is assigned once can be an LLVM value without memory, since its assignment
+comes before each use. Numba makes it such a value only if it is used in a single block. Here it always is one.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from physics.compiler.fused.prepared_entry import write_prepared_entry
 
 
 class _Values(Lower):
-    """Numba's lowering of one function, in which a variable assigned once is a value, and nothing is released."""
+    """Lowering of one function as by Numba, but a variable assigned once is a value, and nothing is released."""
 
     def _find_singly_assigned_variable(self):
         times = Counter(
@@ -34,19 +34,19 @@ class _Values(Lower):
         self._blk_local_varmap = {}
 
     def loadvar(self, name):
-        """Value of a variable."""
+        """LLVM value of the variable `name`."""
         value = self._blk_local_varmap.get(name)
         if value is not None:
             return value
-        self._singly_assigned_vars.discard(name)  # a block used it that is lowered before the one that assigns it
+        self._singly_assigned_vars.discard(name)  # the block that uses it is lowered before the one that assigns it
         return self.builder.load(self.getvar(name))
 
     def alloca_lltype(self, name, lltype, datamodel=None):
-        """Memory of a variable that is assigned more than once."""
+        """Reserve memory for the variable `name`, which is assigned more than once; return its address."""
         return stack_slot(self.builder, lltype)
 
     def storevar(self, value, name, argidx=None):
-        """Give a variable a value."""
+        """Assign an LLVM value to the variable `name`."""
         if name in self._singly_assigned_vars:
             self._blk_local_varmap[name] = value
         else:
@@ -57,10 +57,10 @@ class _Values(Lower):
 
 
 class _KernelLower(_Values if is_on("lowering") else Lower):
-    """Lowering of a kernel, with our builder, and an entry for machine code."""
+    """Lowering of a kernel with `kernel_builder`, and with a prepared entry for machine code."""
 
     def setup_function(self, fndesc):
-        """Declare the function, with our builder for its body."""
+        """Declare the function, and make the builder of its body."""
         super().setup_function(fndesc)
         self.builder = kernel_builder(self.entry_block)
         self.call_helper = self.call_conv.init_call_helper(self.builder)
@@ -68,11 +68,11 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
             self.function.attributes.add("noinline")
 
     def create_cfunc_wrapper(self):
-        """Make the entry for machine code, in place of Numba's for C; see `prepared_entry`."""
+        """Write the prepared entry (`prepared_entry`) instead of Numba's wrapper for C."""
         write_prepared_entry(self.context, self.library, self.fndesc)
 
     def lower_block(self, block):
-        """Lower the statements of a block; unsupported ones raise an error in its own words."""
+        """Lower the statements of a block; the error of an unsupported statement is raised unchanged."""
         self._cur_ir_block = block
         for each in block.body:
             self.loc = each.loc
@@ -85,7 +85,7 @@ class _KernelLower(_Values if is_on("lowering") else Lower):
     if is_on("scalars"):
 
         def lower_binop(self, resty, expr, op):
-            """Lower an operation on two values; constants in it need no values of their own (`scalars` sees them)."""
+            """Lower an operation on two values; a constant among them reaches `scalars` as a constant."""
             context, builder = self.context, self.builder
             function = context.typing_context.resolve_value_type(op)
             sig = function.get_call_type(context.typing_context, self.fndesc.calltypes[expr].args, {})
@@ -101,23 +101,23 @@ class _ValueLower(_KernelLower):
     """Lowering of a function that returns its value instead of a status."""
 
     def setup_function(self, fndesc):
-        """Declare the function."""
+        """Declare the function as one that returns its value."""
         fndesc.__class__ = ValueDescriptor
         super().setup_function(fndesc)
 
 
 class _UserLower(Lower):
-    """Lowering of a user's function, which tracks the present statement for exceptions."""
+    """Lowering of a user's function, which notes the present statement for the lines of exceptions."""
 
     def lower_inst(self, inst):
-        """Lower a statement."""
+        """Lower a statement, and note its line."""
         self.builder.place = self.loc, self.func_ir.func_id.func_name
         super().lower_inst(inst)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class UserLowering(NativeLowering):
-    """Pass that lowers a user's function."""
+    """Pass that lowers a user's function to LLVM IR; exceptions in it name the line."""
 
     _name = "users_lowering"
     lowering_class = _UserLower
@@ -125,7 +125,7 @@ class UserLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class WholeLowering(NativeLowering):
-    """Pass that lowers a kernel for calls from Python."""
+    """Pass that lowers a kernel to LLVM IR, for calls from Python; it returns a status."""
 
     _name = "whole_lowering"
     lowering_class = _KernelLower
@@ -133,13 +133,16 @@ class WholeLowering(NativeLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(WholeLowering):
-    """Pass that lowers a kernel for calls from other kernels."""
+    """Pass that lowers a kernel to LLVM IR, for calls from other kernels; it returns its value if it cannot raise."""
 
     _name = "part_lowering"
     lowering_class = _ValueLower
 
     def run_pass(self, state):
-        """Lower a kernel; one that may raise an exception returns a status, as do all with checked indices."""
+        """Lower a kernel to a function that returns its value, or a status if it may raise an exception.
+
+        With checked indices all kernels return a status.
+        """
         if is_on("calling_convention") and not state.targetctx.enable_boundscheck:
             try:
                 return super().run_pass(state)

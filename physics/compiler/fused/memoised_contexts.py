@@ -1,16 +1,16 @@
-"""Numba's two contexts with cached answers.
+"""Numba's two contexts, for types and for lowering, with cached answers.
 
-To type `a * b` for two floats Numba tries every meaning of `*`, those of arrays, lists and strings as well, and does so
-again for each product of each kernel, in every round of inference and once more while lowering: that was a quarter of
-the time until the first step. The answer depends on the types alone. Here a context shares all that Numba's own one
-holds (and what is registered later), and remembers
+To type `a * b` for two floats Numba tries every meaning of `*`, those of arrays, lists and strings included. It does so
+again for each product of each kernel, in every round of inference and while lowering. That would take a quarter of the
+time until the first step, although the answer depends on the types alone. The contexts here share everything that is
+registered with Numba's own contexts, now or later, and remember
 
-- what a built-in function gives for arguments of some types,
-- of what type a member of a record or an array is,
-- how an operation is lowered, or that there is no special way to,
-- how many bytes a type takes.
+- the type of the result of a built-in function, for the types of its arguments,
+- the type of a member of a record or an array,
+- the lowering of an operation, or that there is none,
+- the size of a type in bytes.
 
-Only kernels of ours are compiled in these contexts; others in the same process see Numba's.
+Only kernels of this package are compiled in these contexts; other functions in the same process use Numba's.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from physics.compiler.fused.operation_table import lowering_of, signature_of
 
 
 class _Forgotten(dict):
-    """Table that keeps nothing."""
+    """Dictionary that stays empty, for use without caching."""
 
     def __setitem__(self, key, value):
-        """Keep nothing."""
+        """Ignore the value."""
 
 
 def _make_table() -> dict:
@@ -44,12 +44,12 @@ def _make_table() -> dict:
 
 
 class MemoisedFunction(types.Function):
-    """Built-in function of Numba that caches its signatures: typing asks for each, and lowering once more.
+    """Type of a built-in function, as Numba's, but it caches the signatures of calls.
 
     Parameters
     ----------
     templates : tuple
-        Of the function that it stands for in contexts of ours.
+        Templates of the function of Numba that it replaces in these contexts.
     """
 
     def __init__(self, templates: tuple):
@@ -57,11 +57,11 @@ class MemoisedFunction(types.Function):
         self.signatures = _make_table()
 
     def augment(self, other):
-        """Numba's function with additional templates, kept for all contexts."""
+        """Type of the function, as Numba's own, with the templates of `other` added."""
         return types.Function(self.templates).augment(other)
 
     def get_call_type(self, context, args, kws):
-        """Signature for arguments of these types."""
+        """Signature of a call with arguments of these types, cached."""
         if kws:
             return super().get_call_type(context, args, kws)
         key = tuple(args)
@@ -76,15 +76,15 @@ register_model(MemoisedFunction)(models.OpaqueModel)
 
 
 class MemoisedTyping(typing.Context):
-    """Typing context of Numba that caches its answers.
+    """Typing context that shares everything with one of Numba, and caches its answers.
 
     Parameters
     ----------
     context : numba.core.typing.Context
-        Whose knowledge is shared.
+        Context of Numba with which it shares its state.
     """
 
-    functions: ClassVar[dict[types.Function, MemoisedFunction]] = {}  # by the one of Numba
+    functions: ClassVar[dict[types.Function, MemoisedFunction]] = {}  # by the function type of Numba
     members: ClassVar[dict[tuple, types.Type]] = _make_table()  # by type and name
 
     def __init__(self, context):
@@ -94,7 +94,7 @@ class MemoisedTyping(typing.Context):
         return self._with_memory(super()._lookup_global(gv))
 
     def _with_memory(self, type_):
-        """`MemoisedFunction` for a built-in function of Numba, any other type as it is."""
+        """Replace the type of a built-in function of Numba by its `MemoisedFunction`; return other types unchanged."""
         if type(type_) is not types.Function:
             return type_
         ours = self.functions.get(type_)
@@ -103,7 +103,7 @@ class MemoisedTyping(typing.Context):
         return ours
 
     def resolve_getattr(self, typ, attr):
-        """Type of a member; None if there is none."""
+        """Type of the member `attr` of a value of type `typ`, cached; None if it has no such member."""
         if isinstance(typ, types.Module):  # whose members may be set anew
             return super().resolve_getattr(typ, attr)
         found = self.members.get((typ, attr))
@@ -116,20 +116,20 @@ class MemoisedTyping(typing.Context):
 
 @cache
 def memoised(context: typing.Context) -> MemoisedTyping:
-    """Memoised form of a typing context, one for each, since Numba keeps compiled code by context."""
+    """Memoised form of a typing context of Numba: always the same object, as Numba keeps compiled code by context."""
     return MemoisedTyping(context)
 
 
 class MemoisedTarget(CPUContext):
-    """Target context that lowers operations in Numba's way, or in fewer instructions for kernels.
+    """Target context for kernels: it lowers operations by `operation_table`, else as Numba does, and caches lowerings.
 
     Parameters
     ----------
     context : CPUContext
-        Whose knowledge is shared.
+        Context of Numba with which it shares its state.
     """
 
-    lowerings: ClassVar[dict[tuple, Callable]] = _make_table()  # by operation, signature, and what is an error
+    lowerings: ClassVar[dict[tuple, Callable]] = _make_table()  # by operation, signature, error model, index checks
     absent: ClassVar[dict[tuple, bool]] = _make_table()  # operations without a lowering, and their signatures
     asked: ClassVar[dict] = _make_table()  # operations for which Numba has looked through its registries
     sizes: ClassVar[dict] = _make_table()  # of LLVM types [bytes]
@@ -139,26 +139,26 @@ class MemoisedTarget(CPUContext):
 
     @classmethod
     def forget(cls, fn) -> None:
-        """Drop the lowered calls of `fn`."""
+        """Forget the cached lowerings of calls of `fn`."""
         for key in [key for key in cls.lowerings if key[0] == fn]:
             del cls.lowerings[key]
 
     @property
     def typing_context(self):
-        """Typing context with cached answers."""
+        """Typing context that belongs to this context, with cached answers."""
         return memoised(self.__dict__["typing_context"])
 
     def mangler(self, name, types, *, abi_tags=(), uid=None):
-        """Name of a symbol; that of a shared kernel (`uid` 0) is the same in all processes.
+        """Name of the symbol of a compiled function; that of a shared kernel (`uid` 0) is the same in all processes.
 
-        Numba names a record type by a number that counts the types of the process. The digest among `abi_tags` tells
-        the types (`dispatcher`), so that the name can do without them.
+        Numba's names of record types contain numbers that differ between processes. A shared kernel's name leaves types
+        out, since the digest among `abi_tags` identifies them (`dispatcher`).
         """
         return super().mangler(name, () if uid == 0 else types, abi_tags=abi_tags, uid=uid)
 
     def get_function(self, fn, sig, _firstcall=True):
-        """Return the function that lowers `fn` for a signature; raise NotImplementedError if there is none."""
-        # What Numba compiles for itself has an error model of its own.
+        """Return the function that lowers `fn` for a signature, cached; raise NotImplementedError if there is none."""
+        # Functions that Numba compiles for itself have another error model.
         key = fn, sig, type(self.error_model), self.enable_boundscheck
         lowering = self.lowerings.get(key)
         if lowering is None:
@@ -171,7 +171,7 @@ class MemoisedTarget(CPUContext):
         return lowering
 
     def numba_function(self, fn, sig, is_first=True):
-        """Return Numba's lowering of `fn`; its registries are searched once for each `fn`, not for each signature."""
+        """Return Numba's lowering of `fn` for a signature; Numba's registries are searched only once for each `fn`."""
         if (fn, sig) in self.absent:
             raise NotImplementedError(f"No definition for lowering {fn}{sig}")
         is_new = is_first and fn not in self.asked
@@ -184,23 +184,23 @@ class MemoisedTarget(CPUContext):
 
     @property
     def call_conv(self):
-        """Calling convention of functions."""
+        """Calling convention of kernels, see `calling_convention`."""
         return calling_convention.ValueCallConv(self)
 
     def declare_function(self, module, fndesc):
-        """Declare a function in a module that defines or calls it."""
+        """Declare the function that `fndesc` describes in an LLVM module that defines or calls it."""
         if calling_convention.returns_value(fndesc):
             return calling_convention.declare_value_function(self, module, fndesc)
         return super().declare_function(module, fndesc)
 
     def get_arg_packer(self, fe_args):
-        """Packer of the words of a call's arguments."""
+        """Packer of the arguments of a call, for arguments of these types; see `argument_passing`."""
         return Arguments(self.data_model_manager, fe_args)
 
     if is_on("array_elements"):
 
         def get_getattr(self, typ, attr):
-            """Return the function that reads a member of a value."""
+            """Return the function that lowers the read of the member `attr` of a value of type `typ`."""
             member = typ.typeof(attr) if isinstance(typ, types.Record) else None
             if isinstance(member, types.NestedArray):
                 return array_in_record
@@ -209,15 +209,15 @@ class MemoisedTarget(CPUContext):
             return super().get_getattr(typ, attr)
 
     def pair_first(self, builder, val, ty):
-        """Lower the value of an iterator's step."""
+        """Read the value from `val`, the LLVM pair (value, is valid) that an iterator's step returns."""
         return builder.extract_value(val, 0)
 
     def pair_second(self, builder, val, ty):
-        """Lower the test whether an iterator's step has a value."""
+        """Read the validity from `val`, the LLVM pair (value, is valid) that an iterator's step returns."""
         return builder.extract_value(val, 1)
 
     def insert_user_function(self, func, fndesc, libs=()):
-        """Register the entry point and the calls of a kernel."""
+        """Register a compiled function by its entry point `func`, so that calls of it can be lowered."""
 
         def call(context, builder, sig, args):
             is_kernel = isinstance(builder, KernelBuilder) and not isinstance(fndesc.restype, types.Optional)
@@ -230,7 +230,7 @@ class MemoisedTarget(CPUContext):
         self._defns[func].append(call, call.signature)
 
     def get_abi_sizeof(self, ty):
-        """Size of an LLVM type [bytes], cached: Numba writes and parses a module for each answer."""
+        """Size of an LLVM type [bytes], cached, since Numba writes and parses an LLVM module to find it."""
         size = self.sizes.get(ty)
         if size is None:
             size = self.sizes[ty] = super().get_abi_sizeof(ty)
@@ -238,7 +238,10 @@ class MemoisedTarget(CPUContext):
 
 
 def _bind_lowering(lower: Callable, context: MemoisedTarget, fn, sig) -> Callable:
-    """Bind one of our lowerings in the form that Numba calls."""
+    """Bind a lowering of `operation_table` to context and signature, in the form that Numba calls.
+
+    If it returns NotImplemented, Numba's own lowering takes its place.
+    """
 
     def lowered(builder, args, loc=None):
         value = lower(context, builder, sig, args)

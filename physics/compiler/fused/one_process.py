@@ -1,7 +1,7 @@
-"""Let one process compile what several want: the others wait for its file, and load it.
+"""Compilation of a kernel by one process if several need it: the others wait for its file, and load it.
 
-The right to compile a kernel is a lock on a file beside that of its machine code. The system takes it back when a
-process ends, however it ends. Where files cannot be locked, each process compiles.
+A process that compiles a kernel holds a lock on a file beside that of the machine code. The system releases the lock
+when the process ends, however it ends. Where files cannot be locked, each process compiles.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 from physics.compiler.fused.ablation import is_on
 from physics.compiler.notices import warn_once
 
-QUIET_WAIT = 1.0  # without a line that says so [s]
-LONGEST_WAIT = 900.0  # for a process that holds a lock and does not go on: then this one compiles, too [s]
+QUIET_WAIT = 1.0  # time of waiting after which a line on standard error says so [s]
+LONGEST_WAIT = 900.0  # time of waiting after which this process compiles, too, in case the other one hangs [s]
 
 
 @contextmanager
 def one_process(path: Path) -> Iterator[None]:
-    """Hold the right to make the file `path`, as a context; wait while another process has it.
+    """Context manager in which no other process makes the file `path` of machine code; it waits while one does.
 
-    The caller looks for the file once more, inside.
+    Within it the caller must look for the file again, which another process may have made meanwhile.
     """
     if not is_on("one_process"):
         yield
@@ -37,8 +37,8 @@ def one_process(path: Path) -> Iterator[None]:
 
 
 def _acquired(path: Path):
-    """A lock, or None where there is none to have."""
-    from filelock import FileLock, Timeout  # only for what is compiled
+    """Acquire the lock of the file `path` and return it; None if files cannot be locked, or after `LONGEST_WAIT`."""
+    from filelock import FileLock, Timeout  # imported only if something is compiled
 
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

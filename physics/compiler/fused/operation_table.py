@@ -1,7 +1,7 @@
-"""Table of operations that replaces Numba's: types of results, and lowerings.
+"""Table of operations whose types and lowerings replace Numba's.
 
-Numba tries a dozen templates for `a[i]`, and then writes many times the necessary code. Each module here knows some
-operations; all others are left to Numba.
+Numba tries a dozen templates for `a[i]`, and then writes several times the necessary instructions. The modules of the
+table have signatures and lowerings for some operations; all others are left to Numba.
 """
 
 from __future__ import annotations
@@ -24,13 +24,16 @@ _TYPING = tuple(module for module in _LOWERING if hasattr(module, "signature"))
 
 
 def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
-    """Signature of `function` for types of arguments, or None to leave it to Numba.
+    """Signature of a call of a built-in function for these types of arguments; None: it is left to Numba.
 
     Parameters
     ----------
     function : types.Function
+        Numba's type of the function, such as that of `operator.getitem`.
     context : typing.Context
+        Typing context.
     args : tuple of types.Type
+        Types of the arguments.
     """
     key = function.typing_key
     for module in _TYPING:
@@ -41,18 +44,20 @@ def signature_of(function: types.Function, context: typing.Context, args: tuple)
 
 
 def lowering_of(function, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers `function` for a signature, or None to leave it to Numba.
+    """Find the function that lowers calls of a built-in function for a signature; None: it is left to Numba.
 
     Parameters
     ----------
     function : types.Function or str
+        Numba's type of the function, or Numba's name of an operation such as "getiter".
     sig : typing.Signature
+        Types of the result and of the arguments.
 
     Returns
     -------
     Callable, optional
-        Of a context, a builder, the signature and the values of the arguments; what it returns is NotImplemented where
-        Numba's way is taken after all.
+        Takes a target context, a builder, the signature and the LLVM values of the arguments, and returns the LLVM
+        value of the result; or NotImplemented, if Numba must lower the call.
     """
     key = function if isinstance(function, str) else getattr(function, "typing_key", None)
     for module in _LOWERING:

@@ -1,9 +1,9 @@
-"""Numba's passes over a kernel before lowering, without those that kernels do not need.
+"""Passes of the compilation of a kernel: Numba's, without those that kernels do not need.
 
-Numba's own pipeline looks for closures, comprehensions, `with`, `raise`, array expressions and functions inlined by
-it, none of which a kernel has, and determines after most passes which variable lives where, which nobody asks for
-where no variable has to be released (`physics.compiler.fused.lowering`). A kernel that does have one of them
-fails to compile. What users write goes through Numba's own pipeline.
+Numba's own passes look for closures, comprehensions, `with`, `raise`, array expressions and functions that Numba
+inlines; kernels have none of them, and a kernel that does fails to compile. After most passes Numba also determines
+where each variable is alive, which is needed only to release variables (`physics.compiler.fused.lowering`). Users'
+functions go through all of Numba's passes.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from physics.compiler.fused.type_inference import infer_types
 
 
 class _Plain(FunctionPass):
-    """A pass that is one function of the state."""
+    """Base of passes with a single method `change(state)`, which changes the state of the compilation."""
 
     def __init__(self):
         super().__init__()
@@ -41,16 +41,19 @@ class _Plain(FunctionPass):
 
 
 class _Interpreter(Interpreter):
-    """Pass from byte code to Numba's own code, with only those corrections that calls with `*` need."""
+    """Translator of byte code to Numba's intermediate code, with the only corrections that kernels need.
+
+    These are the corrections for calls with `*`.
+    """
 
     def post_process(self, peepholes, func_ir):
-        """Leave out corrections for `with`, `try`, dictionaries, and calls with many keywords."""
+        """Correct calls with `*`, but not `with`, `try`, dictionaries, and calls with many keywords."""
         return super().post_process([peep_hole_list_to_tuple], func_ir)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _FromByteCode(_Plain):
-    """Pass that makes Numba's own code of a function."""
+    """Pass that translates the byte code of a function to Numba's intermediate code."""
 
     _name = "kernel_from_byte_code"
 
@@ -60,7 +63,7 @@ class _FromByteCode(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Rewrites(_Plain):
-    """Numba's rewrites before inference, such as that of a constant subscript."""
+    """Pass with Numba's rewrites before type inference, such as that of a constant subscript."""
 
     _name = "kernel_rewrites"
 
@@ -75,7 +78,7 @@ class _Rewrites(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _SingleAssignment(_Plain):
-    """Pass after which each variable is assigned once."""
+    """Pass that renames variables so that each is assigned only once (single assignment form)."""
 
     _name = "kernel_single_assignment"
 
@@ -86,7 +89,7 @@ class _SingleAssignment(_Plain):
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _Types(_Plain):
-    """Pass that finds types of variables and targets of calls."""
+    """Pass that infers the types of variables and calls."""
 
     _name = "kernel_types"
 
@@ -96,7 +99,7 @@ class _Types(_Plain):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _NoPhis(PreLowerStripPhis):
-    """Pass that replaces phi nodes by assignments at the ends of the joining branches."""
+    """Pass that replaces phi nodes by assignments at the ends of the branches that join."""
 
     _name = "kernel_no_phis"
 
@@ -121,12 +124,12 @@ _TYPING_PASSES = (
 
 
 class KernelPasses(PassManager):
-    """Sequence of a kernel's passes; errors keep the words of the pass that raises them.
+    """Sequence of the passes of a kernel; an error of a pass is raised unchanged.
 
     Parameters
     ----------
     at_last : type
-        The lowering to LLVM, and what follows it.
+        Passes at the end: the lowering to LLVM IR, and those that follow it.
     """
 
     def __init__(self, *at_last: type):
@@ -136,7 +139,7 @@ class KernelPasses(PassManager):
         self.finalize()
 
     def run(self, state):
-        """Run pass after pass, without Numba's list of all types between them."""
+        """Run all passes on the state of a compilation, without Numba's checks of all types between them."""
         for each, _ in self.passes:
             one = _pass_registry.get(each).pass_inst
             one.analysis = self._analysis
@@ -144,13 +147,14 @@ class KernelPasses(PassManager):
 
 
 def numbas_passes(state, own: dict[type, type], *after_lowering: type) -> PassManager:
-    """Numba's own pipeline, with some passes replaced by ours.
+    """Make the sequence of Numba's own passes, with some of them replaced.
 
     Parameters
     ----------
     state : numba.core.compiler.StateDict
+        State of the compilation.
     own : dict
-        Passes of ours by those of Numba; one for `NativeLowering` is among them.
+        Dictionary from passes of Numba to their replacements; `NativeLowering` must be among its keys.
     *after_lowering : type
         Passes that follow the lowering.
     """
@@ -168,15 +172,16 @@ def _own_passes(*at_last: type) -> KernelPasses:
 
 
 def kernel_passes(state, lowering: type, *after_lowering: type) -> PassManager:
-    """Passes of a kernel.
+    """Make the sequence of passes that compile a kernel.
 
     Parameters
     ----------
     state : numba.core.compiler.StateDict
+        State of the compilation.
     lowering : type
-        The lowering to LLVM.
+        Pass of the lowering to LLVM IR.
     *after_lowering : type
-        Passes that follow it.
+        Passes that follow the lowering.
     """
     if is_on("passes"):
         return _own_passes(lowering, *after_lowering, NoPythonBackend)

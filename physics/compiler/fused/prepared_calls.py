@@ -1,4 +1,7 @@
-"""Make a call that is prepared in memory, and raise its exception in the calling kernel (`prepared_entry`)."""
+"""Calls that are prepared in memory, made by a kernel, and their exceptions, raised in that kernel.
+
+`prepared_entry` is the other end of such a call: the entry of the kernel that is called.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,18 @@ from numba.extending import intrinsic
 from physics.compiler.fused.folding_builder import WORD, word_constant
 from physics.compiler.fused.prepared_entry import ENTRY_TYPE, STATUS_TYPE, WORD_SIZE
 
-# A kernel's entry, the address of its arguments, and what became of the last call: its status and its exception.
+# Columns of a table of prepared calls: addresses of a kernel's entry and of its arguments; status and exception of the
+# last call.
 JOB_ENTRY, JOB_ARGUMENTS, JOB_STATUS, JOB_EXCEPTION, JOB_SIZE = range(5)
 JOB_BYTES = JOB_SIZE * WORD_SIZE
 
 
 @intrinsic
 def enter_prepared(typing_context, job):
-    """Make the call at an address; return its status."""
+    """Make the prepared call in the row of a table at the address `job`; return its status, not 0 after an exception.
+
+    Status and exception are also written into the row.
+    """
 
     def lower(context, builder, sig, args):
         row = builder.inttoptr(args[0], WORD.as_pointer())
@@ -34,7 +41,7 @@ def enter_prepared(typing_context, job):
 
 @intrinsic
 def raise_prepared(typing_context, code, raised):
-    """Leave the kernel with an exception, if the status is that of one."""
+    """Leave the calling kernel with the exception at the address `raised`, unless the status `code` is 0."""
 
     def lower(context, builder, sig, args):
         code, place = builder.trunc(args[0], STATUS_TYPE), context.call_conv._get_excinfo_argument(builder.function)

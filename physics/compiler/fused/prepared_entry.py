@@ -1,10 +1,10 @@
-"""Entries of kernels for machine code: arguments are read from memory.
+"""Prepared entries of kernels, which read their arguments from memory, so that machine code can make the call.
 
-Python passes two dozen arguments to a kernel. Of each array it reads seven words from a Python object, and only one
-thread at a time runs Python. Here a kernel that returns nothing has a second entry, which takes the address of all
-those words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: of an array Numba's
-words, of a tuple those of its members. The entry returns Numba's status, which is not 0 if the kernel raised an
-exception; its address is then written.
+A call from Python passes two dozen arguments to a kernel. It reads seven words of each array from a Python object, and
+only one thread at a time runs Python. So a kernel that returns nothing has a second entry, which takes the address of
+all these words. They are written once (`physics.parallel.bound_call`), in the order of the arguments: for an array the
+words of Numba's structure, for a tuple those of its members. The entry returns Numba's status, which is not 0 if the
+kernel raised an exception; the address of the exception is then written to memory.
 """
 
 from __future__ import annotations
@@ -28,7 +28,10 @@ ENTRY_TYPE = ir.FunctionType(STATUS_TYPE, [WORD.as_pointer(), excinfo_ptr_t.as_p
 
 
 def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> tuple:
-    """Value of an argument whose words begin at `place`, and the place behind it. Each number has a word of its own."""
+    """Read an argument of this type from the words that begin at number `place`.
+
+    Returns the LLVM value or structure, and the number of the word after it. Each number takes a word of its own.
+    """
     form = context.get_value_type(type_)
     if isinstance(type_, types.BaseTuple):
         members = []
@@ -43,7 +46,7 @@ def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> t
 
 
 def write_prepared_entry(context, library, about) -> None:
-    """Add the second entry of a kernel to its library."""
+    """Add the prepared entry of the kernel that `about` describes to its code library, if it returns nothing."""
     if about.restype != types.none:
         return
     module = context.create_module("ready")

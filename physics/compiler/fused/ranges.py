@@ -1,4 +1,4 @@
-"""Counting loops in as few instructions as possible; Numba tests each range for a step of zero."""
+"""Lowering of loops over `range` to few instructions: Numba's lowering tests each range for a step of zero."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from physics.compiler.fused.folding_builder import (
 
 
 def _count(context, builder, sig, args):
-    """`range(stop)`, `range(start, stop)` or `range(start, stop, step)`."""
+    """Lower `range(stop)`, `range(start, stop)` or `range(start, stop, step)`: start, stop and step as a structure."""
     start, stop, step = (
         (word_constant(0), args[0], word_constant(1)) if len(args) == 1 else (*args, word_constant(1))[:3]
     )
@@ -25,14 +25,17 @@ def _count(context, builder, sig, args):
 
 
 def _iterate(context, builder, sig, args):
-    """Make an iterator over a range: places of its next number and of the remaining count, its end, its step."""
+    """Lower the start of a loop over a range: make its iterator.
+
+    The iterator has the address of the next number, the end, the step, and the address of the remaining count.
+    """
     start, stop, step = (builder.extract_value(args[0], k) for k in range(3))
     stride = known_integer(step)
     if not stride:
         return NotImplemented
     members = stack_slot(builder, WORD), stop, step, stack_slot(builder, WORD)
     builder.store(start, members[0])
-    left = builder.sub(stop, start) if stride > 0 else builder.sub(start, stop)  # none is left if it is negative
+    left = builder.sub(stop, start) if stride > 0 else builder.sub(start, stop)  # negative for an empty range
     if abs(stride) > 1:
         left = builder.sdiv(builder.add(left, word_constant(abs(stride) - 1)), word_constant(abs(stride)))
     builder.store(left, members[3])
@@ -40,7 +43,7 @@ def _iterate(context, builder, sig, args):
 
 
 def _advance(context, builder, sig, args):
-    """Next number, and whether there is one."""
+    """Lower the step of a loop over a range: the pair of the next number and whether it is valid."""
     following, step, left = (builder.extract_value(args[0], k) for k in (0, 2, 3))
     number, left_before = builder.load(following), builder.load(left)
     builder.store(builder.add(number, step, flags=NO_SIGNED_WRAP), following)
@@ -50,7 +53,7 @@ def _advance(context, builder, sig, args):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers a range of words, the start of a loop over it, or its next number."""
+    """Return the function that lowers the operation `key` if it is one on ranges of 64-bit words, else None."""
     if key is range:
         return _count if sig.return_type == types.range_state64_type else None
     if key == "getiter":

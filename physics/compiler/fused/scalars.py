@@ -1,4 +1,4 @@
-"""`max`, `min`, `int` and powers of numbers; Numba compiles a function for each count and type of arguments."""
+"""Lowering of `max`, `min`, `int` and powers of numbers in place; Numba compiles a function for each signature."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from physics.compiler.fused.folding_builder import known_integer
 
 
 def _maximum(context, builder, sig, args):
-    """`max` of numbers: a later one counts if it is larger, as in Python, so a NaN stays if it comes first."""
+    """Lower `max` of numbers: a later number replaces an earlier one if it is larger, so that a NaN in front stays."""
     return do_minmax(context, builder, sig.args, args, operator.gt)
 
 
@@ -21,12 +21,12 @@ def _minimum(context, builder, sig, args):
 
 
 def _to_integer(context, builder, sig, args):
-    """`int(x)`, towards zero."""
+    """Lower `int(x)`, which rounds towards zero."""
     return context.cast(builder, args[0], sig.args[0], sig.return_type)
 
 
 def _power(context, builder, sig, args):
-    """`x ** n`: a constant n gives the products of Numba's loop."""
+    """Lower `x ** n` for a constant n > 0 to the products that Numba's loop would make, in the same order."""
     base, exponent = args[0], known_integer(args[1])
     if not exponent or exponent < 0:
         return NotImplemented
@@ -47,7 +47,7 @@ def _are_numbers(args) -> bool:
 
 
 def signature(key, context, args) -> typing.Signature | None:
-    """Signature of `max`, `min` or `int` of numbers, or None."""
+    """Signature of the operation `key` for types `args` if it is `max`, `min` or `int` of numbers, else None."""
     if key not in _SCALAR_FUNCTIONS or (len(args) == 1) != (key is int):
         return None
     args = tuple(map(types.unliteral, args))
@@ -59,7 +59,7 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers a function of numbers."""
+    """Return the function that lowers the operation `key` if it is one of this module, else None."""
     if key in _SCALAR_FUNCTIONS and _are_numbers(sig.args):
         return _SCALAR_FUNCTIONS[key]
     if key is operator.pow and isinstance(sig.args[0], types.Float) and isinstance(sig.args[1], types.Integer):

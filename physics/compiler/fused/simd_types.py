@@ -1,4 +1,4 @@
-"""Four numbers at once as a vector of LLVM; `physics.compiler.simd` defines each operation."""
+"""Lanes, four numbers at once, as an LLVM vector; `physics.compiler.simd` defines the meaning of each operation."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ NUMBER_SIZE = 8  # [bytes]
 
 
 class LanesType(types.Type):
-    """Type of four numbers."""
+    """Numba type of `Lanes` of four floats."""
 
     def __init__(self):
         super().__init__("lanes")
 
 
 class MaskType(types.Type):
-    """Type of four truth values."""
+    """Numba type of `Lanes` of four truth values."""
 
     def __init__(self):
         super().__init__("marks")
@@ -41,7 +41,7 @@ LANES, MASK = LanesType(), MaskType()
 
 
 def _model_of(type_: type, one: ir.Type) -> None:
-    """Model of values of the type: a vector."""
+    """Register an LLVM vector of four values of type `one` as the form of values of the Numba type `type_`."""
 
     @register_model(type_)
     class Model(data_models.PrimitiveModel):
@@ -79,12 +79,12 @@ def _are_numbers(args) -> bool:
 
 
 def _are_lanes(args) -> bool:
-    """True for lanes, or lanes and numbers, at least one of the former."""
+    """True if these types are lanes and numbers, with lanes at least once."""
     return LANES in args and all(each is LANES or isinstance(each, types.Number) for each in args)
 
 
 def _is_place_of_row(args) -> bool:
-    """True for a table of numbers, and the place of a row's start in it."""
+    """True if these types are a contiguous table of floats and two integers, row and column."""
     return (
         isinstance(args[0], types.Array)
         and (args[0].dtype, args[0].ndim, args[0].layout) == (types.float64, 2, "C")
@@ -93,7 +93,7 @@ def _is_place_of_row(args) -> bool:
 
 
 def _result(key, args) -> types.Type | None:
-    """Type of the result of an operation, or None if it is not on lanes."""
+    """Type of the result of the operation `key` for types `args`; None if it is no operation on lanes."""
     if key is simd.Lanes:
         return LANES if len(args) == simd.LANE_COUNT and _are_numbers(args) else None
     if key is simd.select_lanes and args[0] is types.boolean:
@@ -121,7 +121,7 @@ def _result(key, args) -> types.Type | None:
 
 
 def signature(key, context, args) -> typing.Signature | None:
-    """Signature of an operation on lanes, or None."""
+    """Signature of the operation `key` for types `args`; None if it is no operation on lanes."""
     args = tuple(map(types.unliteral, args))
     result = _result(key, args)
     if result is None:
@@ -133,7 +133,7 @@ def signature(key, context, args) -> typing.Signature | None:
 
 
 class _Named(AbstractTemplate):
-    """Function known to Numba by name: `signature` gives its types."""
+    """Numba template of a function of `simd` that kernels call by name; `signature` gives its types."""
 
     def generic(self, args, kws):
         return signature(self.key, self.context, args)
@@ -147,7 +147,7 @@ for _function in _NAMED:
 
 
 def _spread(builder, value):
-    """Number repeated four times; lanes as they are."""
+    """Repeat a number four times, as lanes; return lanes unchanged."""
     if isinstance(value.type, ir.VectorType):
         return value
     nothing = ir.Constant(ir.VectorType(value.type, simd.LANE_COUNT), ir.Undefined)
@@ -158,13 +158,13 @@ def _spread(builder, value):
 
 
 def _alike(builder, values) -> list:
-    """All values as lanes if one of them is, else unchanged."""
+    """Convert all values to lanes if one of them is lanes; else return them unchanged."""
     has_lanes = any(isinstance(each.type, ir.VectorType) for each in values)
     return [_spread(builder, each) for each in values] if has_lanes else list(values)
 
 
 def _make(context, builder, sig, args):
-    """`Lanes(a, b, c, d)`."""
+    """Lower `Lanes(a, b, c, d)`: put four numbers into a vector."""
     made = ir.Constant(context.get_value_type(LANES), ir.Undefined)
     for k, value in enumerate(args):
         made = builder.insert_element(made, value, _INDEX(k))
@@ -186,7 +186,7 @@ def _choose(context, builder, sig, args):
 
 
 def _one_of_two(order, context, builder, sig, args):
-    """`larger` and `smaller`."""
+    """Lower `larger` (`order` is ``>``) or `smaller` (``<``) of two lanes or numbers."""
     x, y = _alike(builder, args)
     return builder.select(builder.fcmp_ordered(order, y, x), y, x)
 
@@ -200,7 +200,7 @@ def _not(context, builder, sig, args):
 
 
 def _call(name, context, builder, sig, args):
-    """Call an LLVM function for vectors and numbers."""
+    """Lower an operation to LLVM's function `name`, such as ``sqrt``, for lanes or for a number."""
     type_ = args[0].type
     width = f"v{simd.LANE_COUNT}" if isinstance(type_, ir.VectorType) else ""
     function = cgutils.get_or_insert_function(
@@ -210,7 +210,7 @@ def _call(name, context, builder, sig, args):
 
 
 def _place_of_row(context, builder, sig, args):
-    """Pointer to four numbers of a table."""
+    """Pointer to four neighbouring numbers of a table, from table[row, column] on."""
     if context.enable_boundscheck:
         array_elements.element_pointer(
             context, builder, sig.args[0], args[0], sig.args[1:3], [args[1], _last(builder, args[2])]
@@ -220,23 +220,23 @@ def _place_of_row(context, builder, sig, args):
 
 
 def _last(builder, first):
-    """Column of the last number of a row."""
+    """Column of the last of four numbers that begin at column `first`."""
     return builder.add(first, word_constant(simd.LANE_COUNT - 1))
 
 
 def _read_row(context, builder, sig, args):
-    """`load_lanes`: the alignment is that of one number, since a table may begin anywhere."""
+    """Lower `load_lanes`; the alignment is that of one number, since a table may begin at any number."""
     return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
 
 
 def _write_row(context, builder, sig, args):
-    """`store_lanes`."""
+    """Lower `store_lanes`: write four neighbouring numbers of a table; the alignment is that of one number."""
     builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
     return context.get_dummy_value()
 
 
 def _totals(context, builder, sig, args):
-    """`lane_sums`: adds halves of two and two vectors side by side, then halves of the results."""
+    """Lower `lane_sums`: add the halves of two vectors at a time, then the halves of the results."""
     a, b, c, d = (_spread(builder, each) for each in args)
 
     def joined(x, y, first, second):
@@ -251,7 +251,7 @@ def _totals(context, builder, sig, args):
 
 
 def _halves(builder, value, join: Callable):
-    """Combine all four lanes: the two halves with each other, then the two that remain."""
+    """Combine all four lanes of a value to one number: `join` combines both halves, then the two lanes that remain."""
     for width in (2, 1):
         nothing = ir.Constant(value.type, ir.Undefined)
         parts = [
@@ -269,24 +269,24 @@ def _total(context, builder, sig, args):
 
 
 def _extreme(order, context, builder, sig, args):
-    """`max_of_lanes` and `min_of_lanes`."""
+    """Lower `max_of_lanes` (`order` is ``>``) or `min_of_lanes` (``<``)."""
     return _halves(builder, args[0], lambda x, y: builder.select(builder.fcmp_ordered(order, y, x), y, x))
 
 
 def _first(context, builder, sig, args):
-    """`first_true_lane`: four bits as a number, whose trailing zeros are counted."""
+    """Lower `first_true_lane`: the four truth values become the bits of a number, whose trailing zeros are counted."""
     bits = builder.bitcast(args[0], ir.IntType(simd.LANE_COUNT))
     place = builder.cttz(builder.zext(bits, WORD), ir.IntType(1)(0))
     return builder.select(builder.icmp_unsigned("==", bits, bits.type(0)), word_constant(-1), place)
 
 
 def _read(context, builder, sig, args):
-    """`x[k]`."""
+    """Lower `x[k]`, one number of lanes."""
     return builder.extract_element(args[0], args[1])
 
 
 def _lane(builder, value, k: int):
-    """One lane: the number from which it was made, if that is known."""
+    """Lane number `k` of a value: the number from which it was made if that is known, else by an instruction."""
     made = value
     while isinstance(made, InsertElement):
         made, number, place = made.operands
@@ -296,7 +296,10 @@ def _lane(builder, value, k: int):
 
 
 def _each_lane(lower: Callable, context, builder, sig, args):
-    """Operation on each lane, one after another."""
+    """Lower an operation on lanes as four operations on numbers, used if the optimisation `simd_types` is off.
+
+    `lower` lowers the operation on numbers.
+    """
     if sig.return_type not in (LANES, MASK):
         return lower(context, builder, sig, args)
     made = ir.Constant(context.get_value_type(sig.return_type), ir.Undefined)
@@ -332,6 +335,6 @@ _LOWERINGS = {
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers an operation on lanes."""
+    """Return the function that lowers the operation `key` if it is one on lanes, else None."""
     is_ours = key in _NAMED or LANES in sig.args or MASK in sig.args
     return _LOWERINGS.get(key) if is_ours else None

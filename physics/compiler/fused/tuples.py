@@ -1,4 +1,4 @@
-"""Tuples of numbers: members by index, and membership tests."""
+"""Lowering of `t[k]` and `x in t` for tuples of numbers."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from physics.compiler.fused.folding_builder import KernelBuilder, make_struct, m
 
 
 def _is_numbers(type_: types.Type) -> bool:
-    """True for a number, or a tuple of numbers and such tuples."""
+    """True for the type of a number, or of a tuple of numbers, possibly nested."""
     if isinstance(type_, types.BaseTuple):
         return all(map(_is_numbers, type_.types))
     return isinstance(type_, types.Number)
 
 
 def _choose(context, builder, sig, args):
-    """`t[k]`, counted from the front; only NUMBA_BOUNDSCHECK=1 checks that k is a member's index."""
+    """Lower `t[k]`, with k counted from the front; only under NUMBA_BOUNDSCHECK=1 a k out of range raises an error."""
     if not isinstance(builder, KernelBuilder):
         return NotImplemented
     chosen = context.get_value_type(sig.return_type)
@@ -46,7 +46,7 @@ def _choose(context, builder, sig, args):
 
 
 def _contains(context, builder, sig, args):
-    """`x in t` for numbers."""
+    """Lower `x in t` for a number x and a tuple t of numbers."""
     members, number = sig.args
     found = context.get_constant(types.boolean, False)
     for k, type_ in enumerate(members):
@@ -56,14 +56,14 @@ def _contains(context, builder, sig, args):
 
 
 def _words(builder, value) -> list:
-    """All numbers of a tuple of tuples, in order."""
+    """List all numbers of a tuple, nested tuples included, in order, as LLVM values."""
     if not isinstance(value.type, ir.Aggregate):
         return [value]
     return [word for k in range(len(value.type)) for word in _words(builder, builder.extract_value(value, k))]
 
 
 def _put_together(builder, type_: ir.Type, words):
-    """Make a tuple of tuples from its numbers."""
+    """Make a tuple of this LLVM type, possibly nested, from an iterator over its numbers."""
     if not isinstance(type_, ir.Aggregate):
         return next(words)
     return make_struct(
@@ -72,7 +72,7 @@ def _put_together(builder, type_: ir.Type, words):
 
 
 def lowering(key, sig: typing.Signature) -> Callable | None:
-    """Return the function that lowers a member by index, or a membership test."""
+    """Return the function that lowers the operation `key` if it is `t[k]` or `x in t` for tuples of numbers."""
     if len(sig.args) != 2 or not isinstance(sig.args[0], types.UniTuple):
         return None
     members, other = sig.args

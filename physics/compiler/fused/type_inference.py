@@ -1,4 +1,4 @@
-"""Types of the variables of a kernel."""
+"""Type inference: the types of the variables and calls of a kernel."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from physics.compiler.fused.ablation import is_on
 
 
 def infer_types(state) -> None:
-    """Write types of variables, of the result and of calls into the state of a compilation.
+    """Infer the types of variables, of the result and of calls, and write them into the state of a compilation.
 
     Parameters
     ----------
     state : numba.core.compiler.StateDict
+        State of the compilation, changed.
 
     Raises
     ------
     numba.core.errors.TypingError
-        Naming the line for which there is none.
+        A type cannot be found; the message names the line.
     """
     code, context = state.func_ir, state.typingctx
     warnings = WarningsFixer(NumbaWarning)
@@ -35,24 +36,24 @@ def infer_types(state) -> None:
 
 
 class _Network(ConstraintNetwork):
-    """Network of type constraints; a constraint is checked again after the type of one of its variables has changed.
+    """Network of type constraints in which a constraint is checked again only if a type in it has changed.
 
-    Numba checks all constraints until a round changes nothing, which takes two rounds for most kernels.
+    Numba checks all constraints again and again until a round changes nothing: two rounds for most kernels.
     """
 
     def __init__(self):
         super().__init__()
         self._about: list[list[str]] = []  # for each constraint, names of variables (and of attributes)
-        self._seen: list[list | None] = []  # types of these variables after it was looked at
+        self._seen: list[list | None] = []  # types of these variables after the last check of the constraint
 
     def append(self, constraint):
-        """Add a constraint."""
+        """Add a constraint, and note the variables in it."""
         super().append(constraint)
         self._about.append(sorted(set(_names(vars(constraint).values()))))
         self._seen.append(None)
 
     def propagate(self, typeinfer):
-        """Check each constraint; return errors and unknown types."""
+        """Check the constraints once; return a list of the errors, such as types that are not known yet."""
         wrong = []
         for k, constraint in enumerate(self.constraints):
             if self._seen[k] == self._types(k, typeinfer.typevars):
@@ -69,7 +70,7 @@ class _Network(ConstraintNetwork):
 
 
 def _names(values) -> list[str]:
-    """Names of variables among values of any kind."""
+    """Names of all variables in `values`, nested lists, tuples and dictionaries included; strings count as names."""
     found = []
     for each in values:
         if isinstance(each, ir.Var):

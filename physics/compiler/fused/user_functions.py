@@ -1,7 +1,7 @@
-"""Examine a user's function in the form that Numba makes of it: its result, and all that it reads.
+"""Examination of a user's function in Numba's intermediate code: the form of its result, and everything that it reads.
 
-A kernel has no exceptions and no checks of bounds; a user's function may have both. So it is first compiled alone, for
-the types of its later calls, so that nothing is compiled twice. Then its code is examined.
+A kernel neither raises exceptions nor checks indices; a user's function may do both. So it is compiled alone before a
+step, for the types of arguments of its later calls, which use the same code. Then its intermediate code is examined.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numba.core.dispatcher import Dispatcher
 
 from physics.compiler.user_function import ARRAY, NONE, NUMBER, Examined, FaultyFunctionError, entries, in_words
 
-# Statements that raise nothing, and operations that only do through a value that is looked at where it is made.
+# Statements that never raise an exception; operations that raise one only because of a value whose origin is examined.
 _PLAIN = (ir.Assign, ir.Del, ir.Jump, ir.Branch, ir.Return)
 _SAFE = ("binop", "inplace_binop", "unary", "getattr", "build_tuple", "cast", "phi", "null", "getiter", "iternext",
          "pair_first", "pair_second")  # fmt: skip
@@ -24,16 +24,18 @@ _SAFE = ("binop", "inplace_binop", "unary", "getattr", "build_tuple", "cast", "p
 
 @dataclass
 class _Reader:
-    """Reader of a field's function and of all that it calls.
+    """Examiner of a field's function and of all functions that it calls.
 
     Attributes
     ----------
     size : int
-        Length of p.
+        Length of p, the argument with the numbers of the field.
     numbers : str
-        What p holds, for messages.
+        Description of the numbers in p, for messages.
     may_raise : bool
-        Whether some call may raise an exception.
+        Whether some statement examined so far may raise an exception.
+    read_already : set
+        Functions that have been examined, each with the names of its arguments that are p.
     """
 
     size: int
@@ -42,7 +44,10 @@ class _Reader:
     read_already: set = field(default_factory=set)
 
     def read(self, function: Dispatcher, made, own: set[str]) -> None:
-        """Read Numba's form of a function; `own` are the arguments that are p."""
+        """Examine a function, given Numba's result `made` of its compilation; `own` are its arguments that are p.
+
+        FaultyFunctionError if it writes to p, reads beyond its end, or passes an array to an unchecked function.
+        """
         about = made.type_annotation
         if (made.library, frozenset(own)) in self.read_already:
             return
@@ -64,7 +69,7 @@ class _Reader:
         if expr.op == "call":
             self._look_at_call(expr, function, made, own)
         elif expr.op in ("static_getitem", "exhaust_iter") and isinstance(types_of[expr.value.name], types.BaseTuple):
-            pass  # checked by Numba
+            pass  # Numba has checked the index
         elif expr.op == "static_getitem" and isinstance(expr.index, slice):
             pass
         elif expr.op == "static_getitem" and expr.value.name in own and isinstance(expr.index, int) and not is_sized:
@@ -91,7 +96,7 @@ class _Reader:
                 )  # fmt: skip
             self.may_raise |= not (called.py_func.__module__ or "").startswith("physics.kernels.")
             return
-        if not hasattr(called, "as_part"):  # Numba's own
+        if not hasattr(called, "as_part"):  # a function under `numba.njit`
             self.may_raise = True
             return
         names = inspect.signature(called.py_func).parameters
@@ -103,7 +108,7 @@ class _Reader:
 
 
 def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
-    """Names of p: the given ones, and variables assigned once from one of them."""
+    """Names of variables that are p: the names `own`, and variables that are assigned only once, from one of them."""
     found, times = set(own), Counter(each.target.name for each in assigned)
     for each in assigned:
         if isinstance(each.value, ir.Var) and each.value.name in found and times[each.target.name] == 1:
@@ -112,7 +117,7 @@ def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
 
 
 def _asks_for_size(value, own: set[str]) -> bool:
-    """True if this may be p's length, so that a constant index may stand behind a test."""
+    """True if a value may be computed from p's length: a constant index may then be guarded by a test of the length."""
     if not isinstance(value, ir.Expr):
         return False
     if value.op == "getattr":
@@ -121,7 +126,7 @@ def _asks_for_size(value, own: set[str]) -> bool:
 
 
 def form_of(type_: types.Type) -> str | tuple:
-    """Form of values of a type (`compiler.user_function`)."""
+    """Form of the values of a Numba type, in the words of `compiler.user_function`, such as `NUMBER`."""
     if isinstance(type_, (types.Integer, types.Float, types.Boolean)):
         return NUMBER
     if isinstance(type_, types.BaseTuple):
@@ -134,22 +139,29 @@ def form_of(type_: types.Type) -> str | tuple:
 
 
 def examine(function: Dispatcher, arguments: tuple, numbers: str) -> Examined:
-    """Compile a user's function, and read it and all that it calls.
+    """Compile a user's function, and examine it and all functions that it calls.
 
     Parameters
     ----------
     function : kernel
+        The function ``(state, p, t)``, made by `user_kernel`.
     arguments : tuple
-        State, numbers p and time, as it is called with.
+        Example of its arguments: state of a body, numbers p of the field, and time.
     numbers : str
-        The numbers in p, in words.
+        Description of the numbers in p, for messages.
+
+    Returns
+    -------
+    Examined
+        Form of the result, line of the return, and whether a call may raise an exception.
 
     Raises
     ------
     FaultyFunctionError
-        It reads what p does not have, writes to p, or hands p to a function that does not check.
+        The function reads beyond the end of p, writes to p, or passes an array to a function that does not check
+        indices.
     Exception
-        In Numba's words: it cannot be compiled.
+        Numba's exception if the function cannot be compiled.
     """
     made = function.as_part(tuple(map(numba.typeof, arguments)))
     blocks = made.type_annotation.blocks.values()

@@ -1,1 +1,1 @@
-"""Kernels run by Python itself, with the results of machine code."""
+"""Compiler `python`: kernels run as Python functions, with the arithmetic of machine code."""

@@ -1,4 +1,4 @@
-"""Run kernels as Python functions: the interface of `compiler.decorators` without a compiler."""
+"""Interface for `compiler.decorators` without compilation: kernels run as Python functions."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from physics.compiler.interpreted.ieee_source import as_ieee
 from physics.compiler.interpreted.records import records_of, type_of
 from physics.compiler.user_function import Examined, probe
 
-# Held while something is compiled elsewhere; here nothing is.
+# Lock with the meaning of `fused.backend.LOCK`.
 LOCK = threading.RLock()
 
-# Answers as of `fused.backend`.
+# Constants with the meanings that `fused.backend` explains.
 PREPARES_CALLS, MAKES_MACHINE_CODE, COLLECT_AT = False, False, gc.get_threshold()
 atomic_add = None
 
 
 def part(function):
-    """Make a kernel of a function: the same function, with the arithmetic of machine code."""
+    """Make a kernel of a function: a Python function with the arithmetic of machine code."""
     made = as_ieee(function)
     made.py_func = function
     return made
@@ -33,13 +33,13 @@ shared_part = inlined_part = runtime_part = user_part = part
 
 
 def entry(function):
-    """Make a kernel that Python calls."""
+    """Make a kernel that Python may call directly."""
     made = part(function)
     return wraps(made)(machine_code(made, ()))
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Call `choose` once for each type of the arguments."""
+    """Make a kernel that calls the function that `choose` picks from the arguments, once for each of their types."""
     known: dict[tuple, Callable] = {}
 
     def call(*arguments):
@@ -53,17 +53,17 @@ def chosen(stub: Callable, choose: Callable) -> Callable:
 
 
 def is_kernel(value) -> bool:
-    """True for the result of a kernel decorator."""
+    """True if a value was made by a decorator of kernels."""
     return hasattr(value, "py_func")
 
 
 def is_none(value) -> bool:
-    """True for None."""
+    """True if a value is None."""
     return value is None
 
 
 def member(group, name: str):
-    """A member of a named tuple or of a record."""
+    """Member `name` of a named tuple or of a record."""
     return getattr(group, name)
 
 
@@ -73,7 +73,10 @@ def record_members(record):
 
 
 def machine_code(kernel: Callable, arguments: tuple) -> Callable:
-    """The kernel as Python calls it, with arrays of records lent as `records.RecordArray`."""
+    """Make a function that calls a kernel, with arrays of records converted to `records.RecordArray`.
+
+    `arguments` do not matter here.
+    """
 
     def call(*arguments):
         with np.errstate(all="ignore"):
@@ -84,21 +87,24 @@ def machine_code(kernel: Callable, arguments: tuple) -> Callable:
 
 @part
 def lend(value):
-    """Return the same arrays."""
+    """Lend arrays to other kernels: here they stay the same values."""
     return value
 
 
 def renew(function) -> None:
-    """Do nothing: a Python function reads globals when it is called."""
+    """Do nothing: a Python function reads globals at each call."""
 
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels compiled during the block: none."""
+    """Context manager that counts compilations; it yields a function that returns 0, as nothing is compiled."""
     yield lambda: 0
 
 
 def examine(function: Callable, arguments: tuple, numbers: str) -> Examined:
-    """Call a user's function once, with read-only numbers p; see `fused.user_functions.examine`."""
+    """Examine a user's function by a call with read-only numbers p; `fused.user_functions.examine` documents arguments.
+
+    Without its intermediate code, every function counts as one that may raise an exception.
+    """
     arguments[1].flags.writeable = False
     return Examined(probe(function, machine_code(function, arguments), arguments, numbers), None, may_raise=True)

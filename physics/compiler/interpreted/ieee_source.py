@@ -1,7 +1,8 @@
-"""Functions with the arithmetic of machine code: infinity or NaN where Python raises an exception.
+"""Conversion of functions to the arithmetic of machine code: infinity or NaN where Python raises an exception.
 
-Quotients, powers and functions of `math` in a kernel become calls of functions here. The source of the kernel is parsed
-and rewritten for that, each line in its place, so that a debugger stops at the statements of its file.
+Quotients, powers and functions of `math` in a kernel are replaced by calls of the functions here. For this the source
+of the kernel is parsed and rewritten. All lines keep their numbers, so that a debugger stops at the statements of the
+file.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 
 
 def divide(x, y):
-    """Quotient of two numbers; infinite for a division by zero, NaN for zero by zero."""
+    """Quotient of two numbers; infinite for a division by zero, NaN for 0 / 0."""
     try:
         return x / y
     except ZeroDivisionError:
@@ -26,7 +27,7 @@ def divide(x, y):
 
 
 def power(x, n):
-    """Power; a small integer exponent gives Numba's products, in their order."""
+    """Power of a number; for a small integer exponent by the same products as Numba's, in the same order."""
     if isinstance(n, int) and not isinstance(x, int) and 0 <= n <= _MAX_PRODUCTS:
         result = 1.0
         while n:
@@ -43,7 +44,7 @@ _MAX_PRODUCTS = 64
 
 
 def _guarded(function: Callable) -> Callable:
-    """Function of `math` with NumPy's result where Python raises an exception."""
+    """Wrap a function of `math`: where it raises an exception, the wrapper returns NumPy's result."""
     named = {"acos": "arccos", "asin": "arcsin", "atan": "arctan", "pow": "power"}
     of_numpy = getattr(np, named.get(function.__name__, function.__name__), None)
 
@@ -69,7 +70,7 @@ _NAMES = {"__ieee_divide__": divide, "__ieee_power__": power, "__ieee_math__": I
 
 
 class _Rewrite(ast.NodeTransformer):
-    """Replacement of operators and of `math` by `divide`, `power` and `IEEE_MATH` in a source."""
+    """Transformer of a syntax tree that replaces ``/``, ``**`` and `math` by `divide`, `power` and `IEEE_MATH`."""
 
     def visit_BinOp(self, node):
         self.generic_visit(node)
@@ -98,10 +99,10 @@ def _call(name: str, where: ast.AST, *arguments: ast.expr) -> ast.Call:
 
 @cache
 def _codes(file: str, source: str) -> dict[tuple[int, str], CodeType]:
-    """Rewritten code of all functions of a file, by first line and name."""
+    """Rewritten code of all functions in the source of a file, by first line and name."""
     try:
         tree = ast.parse(source)
-    except SyntaxError:  # no Python, as a cell of a notebook with commands of its own
+    except SyntaxError:  # such as a cell of a notebook with commands that are no Python
         return {}
     found, left = {}, [compile(_Rewrite().visit(tree), file, "exec", dont_inherit=True)]
     while left:
@@ -112,12 +113,12 @@ def _codes(file: str, source: str) -> dict[tuple[int, str], CodeType]:
 
 
 def as_ieee(function: FunctionType) -> FunctionType:
-    """Make a function with the arithmetic of machine code; the same one if its source is unknown."""
+    """Convert a function to the arithmetic of machine code; it is returned unchanged if its source is unknown."""
     old = function.__code__
     linecache.checkcache(old.co_filename)  # it may have been edited
     source = "".join(linecache.getlines(old.co_filename, function.__globals__))
     code = _codes(old.co_filename, source).get((old.co_firstlineno, old.co_name))
-    if code is None or code.co_name == "<lambda>":  # of which a line may hold several
+    if code is None or code.co_name == "<lambda>":  # a line may hold several lambdas, which are not told apart
         return function
     function.__globals__.update(_NAMES)
     cells = dict(zip(old.co_freevars, function.__closure__ or (), strict=True))

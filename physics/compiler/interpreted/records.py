@@ -1,6 +1,6 @@
-"""Records of NumPy arrays with their fields as attributes, as kernels read them.
+"""Arrays of records whose fields are attributes, as kernels read them, for kernels that run as Python functions.
 
-NumPy has `recarray` for this, but there a field named `shape` is hidden by the shape of the record itself.
+NumPy's `recarray` does the same, but hides a field named `shape` behind the shape of the record itself.
 """
 
 from __future__ import annotations
@@ -11,7 +11,11 @@ import numpy as np
 
 
 class Record:
-    """Record of an array: numbers are read and written in the array; array fields are views of it, records records."""
+    """Record of a structured array, with its fields as attributes; base of the classes that `_class_of` makes.
+
+    Numbers are read from and written to the array. Fields that are arrays are views of it; those that are records are
+    `Record` objects.
+    """
 
     __slots__ = ("_record", "_views", "dtype")
 
@@ -21,7 +25,7 @@ class Record:
 
 
 def _is_part(dtype: np.dtype) -> bool:
-    """True for the type of an array or of a record, False for that of a number."""
+    """True if a field of this type is an array or a record, False if it is a number."""
     return bool(dtype.shape or dtype.names)
 
 
@@ -44,17 +48,18 @@ def _view(name: str) -> property:
 
 @cache
 def _class_of(dtype: np.dtype) -> type:
-    """Class of the records of a type."""
+    """Make the subclass of `Record` for records of this type, with a property for each field."""
     fields = {name: _view(name) if _is_part(dtype[name]) else _number(name) for name in dtype.names}
     return type("Record", (Record,), {"__slots__": (), **fields})
 
 
 class RecordArray:
-    """A one-dimensional array of records.
+    """One-dimensional array of records, whose elements are `Record` objects.
 
     Parameters
     ----------
     array : (n,) structured array
+        Array that holds the numbers; it is not copied.
     """
 
     __slots__ = ("_array", "_kind", "_records", "dtype", "shape")
@@ -74,7 +79,7 @@ class RecordArray:
 
 
 def records_of(value):
-    """Arguments of a kernel, with `RecordArray` and `Record` for arrays of records, also within tuples."""
+    """Convert an argument of a kernel: structured arrays become `RecordArray`, records `Record`, also within tuples."""
     if isinstance(value, np.ndarray):
         return RecordArray(value) if value.dtype.names else value
     if isinstance(value, np.void) and value.dtype.names:
@@ -86,7 +91,7 @@ def records_of(value):
 
 
 def type_of(value):
-    """Type of an argument in a compiler's view: that of its record, or of the members of a tuple."""
+    """Type of an argument by which kernels are chosen: of records their dtype, of tuples that of all members."""
     if isinstance(value, (Record, RecordArray)):
         return value.dtype
     return (type(value), *map(type_of, value)) if isinstance(value, tuple) else type(value)

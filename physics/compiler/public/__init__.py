@@ -1,1 +1,1 @@
-"""Kernels compiled one by one, through public interfaces of Numba alone."""
+"""Compiler `numba`: kernels are compiled one by one, with public interfaces of Numba only."""

@@ -1,7 +1,7 @@
-"""Compile each kernel with `numba.njit`: the interface of `compiler.decorators`, without private interfaces of Numba.
+"""Interface for `compiler.decorators` with `numba.njit` for each kernel, without private interfaces of Numba.
 
-A kernel that Python calls is compiled with all kernels below it, and Numba keeps it on disk in a folder of ours. LLVM
-decides alone what it inlines.
+A kernel that Python calls is compiled with all kernels below it; Numba keeps it on disk, in a folder of this package.
+LLVM decides which kernels it inlines.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from physics.compiler.public.lent import declare_members, lend, member_type  # n
 from physics.compiler.public.simd_types import OPTIONS  # which also registers operations on lanes
 from physics.compiler.user_function import Examined, FaultyFunctionError, probe
 
-# Held while something is compiled or loaded.
+# Lock that a thread holds while it compiles or loads a kernel.
 LOCK = threading.RLock()
 
-# Answers as of `fused.backend`. Numba's tables would take half a gigabyte without the garbage collector.
+# Constants with the meanings that `fused.backend` explains. Without the garbage collector Numba's tables would take
+# half a gigabyte.
 PREPARES_CALLS, MAKES_MACHINE_CODE, COLLECT_AT = False, True, (100_000, 50, 50)
 atomic_add = None
 
@@ -34,7 +35,7 @@ _compilations = 0
 
 
 def part(function):
-    """Compile a function that other kernels call."""
+    """Make a kernel of a function that other kernels call."""
     return numba.njit(**OPTIONS)(function)
 
 
@@ -43,11 +44,14 @@ shared_part = inlined_part = runtime_part = part
 
 @cache
 def _own_folder() -> Path | None:
-    """Folder of machine code if nobody else may write to it, since Numba runs any content."""
+    """Folder of machine code; None if it cannot be written, or if other users may write to it.
+
+    Numba runs the content of its cache files without a check.
+    """
     folder = cache_dir()
     if folder is None:
         return None
-    try:  # where Numba cannot write it takes `__pycache__`, and machine code of kernels that were edited since
+    try:  # without write access Numba would use `__pycache__`, and there old machine code of kernels edited since
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
@@ -61,7 +65,7 @@ def _own_folder() -> Path | None:
 
 
 def entry(function):
-    """Compile a function that Python calls; it is kept on disk, with the machine code of all below it."""
+    """Make a kernel of a function that Python calls; Numba keeps it on disk, together with all kernels below it."""
     folder = _own_folder()
     if folder is None:
         return part(function)
@@ -73,35 +77,35 @@ def entry(function):
 
 
 def user_part(function):
-    """Compile a user's function, with checks of its indices."""
+    """Make a kernel of a user's function that checks its indices."""
     return numba.njit(boundscheck=True, **OPTIONS)(function)
 
 
 def chosen(stub: Callable, choose: Callable) -> Callable:
-    """Let `choose` pick the function for a call of `stub`."""
+    """Let `choose` pick, by the types of arguments, the function that replaces each call of `stub`."""
     overload(stub, jit_options=OPTIONS, strict=False)(choose)
     return stub
 
 
 def is_kernel(value) -> bool:
-    """True for the result of a kernel decorator."""
+    """True if a value was made by a decorator of kernels."""
     return is_jitted(value)
 
 
 def is_none(value) -> bool:
-    """True for None and its type."""
+    """True if a value is None, or Numba's type of None."""
     return value is None or isinstance(value, types.NoneType)
 
 
 def member(group, name: str):
-    """A member of a named tuple, or the type of one in the type of a named tuple or of a record."""
+    """Member `name` of a named tuple; of the type of a named tuple or record, the type of that member."""
     if isinstance(group, types.Record):
         return group.typeof(name)
     return member_type(group, name) if isinstance(group, types.Type) else getattr(group, name)
 
 
 def record_members(record):
-    """Names of the members of a record, or of the type of one."""
+    """Names of the members of a record, given as a record or as its type."""
     return record.fields if isinstance(record, types.Record) else record.dtype.names
 
 
@@ -111,32 +115,36 @@ def _entry(kernel):
 
 
 def machine_code(kernel, arguments: tuple) -> Callable:
-    """Machine code of a kernel for arguments of these types, to be called with such arguments."""
+    """Compile a kernel for arguments of these types; return a function that runs the machine code."""
     global _compilations
     with LOCK:
         declare_members(arguments)
         whole = _entry(kernel)
         loaded = sum(whole.stats.cache_hits.values())
-        _compilations += 1  # as far as is known until it ends
+        _compilations += 1  # corrected below if the machine code was loaded from disk
         code = whole.compile(tuple(map(numba.typeof, arguments)))
         _compilations -= sum(whole.stats.cache_hits.values()) - loaded
     return code
 
 
 def renew(function) -> None:
-    """Drop the compiled code of a function, after a global that it reads has changed."""
+    """Discard the compiled code of a function, after a global that it reads has changed."""
     function.recompile()
 
 
 @contextmanager
 def count_compilations() -> Iterator[Callable[[], int]]:
-    """Count the kernels compiled during the block; yields a function that returns the number."""
+    """Context manager that counts compilations; it yields a function that returns their present number."""
     before = _compilations
     yield lambda: _compilations - before
 
 
 def examine(function, arguments: tuple, numbers: str) -> Examined:
-    """Compile a user's function for read-only numbers p, and call it once; see `fused.user_functions.examine`."""
+    """Examine a user's function: compile it for read-only numbers p and call it once.
+
+    `fused.user_functions.examine` documents the arguments. Without a look at its code, every function counts as one
+    that may raise an exception.
+    """
     state, p, t = arguments
     p.flags.writeable = False
     arguments = state, p, t

@@ -1,7 +1,7 @@
-"""Lend the arguments of a step to the kernels below it: large groups by address.
+"""Lending of the arguments of a step to the kernels below it, with large named tuples passed by address.
 
-Numba hands a tuple on word by word: the scratch of many bodies is a hundred arrays of seven words each. Here such a
-group is put in memory once, and kernels are handed its address. A member that is a group is again an address.
+Numba passes a tuple word by word; the workspace of bodies that touch is a hundred arrays of seven words each. Here such
+a tuple is written to memory once, and kernels get its address. A member that is a named tuple is again an address.
 """
 
 from __future__ import annotations
@@ -13,17 +13,19 @@ from numba.extending import intrinsic, models, overload_attribute, register_mode
 
 from physics.compiler.public.reference_counts import WITH_COUNTS
 
-# Words of a group above which it is handed on by its address: three arrays. With 64 the block takes longer to compile,
-# and a step longer; the scratch of many bodies, word by word, took 528 CPU seconds to compile.
+# A named tuple of more words than this, about three arrays, is passed by its address. With 64 words compilation and
+# step of the block take longer. The workspace of bodies that touch, passed word by word, took 528 CPU seconds to
+# compile.
 MANY_WORDS = 16
 
 
 class LentGroup(types.Type):
-    """Type of the address of a named tuple.
+    """Numba type of a named tuple that is passed by its address.
 
     Parameters
     ----------
     group : numba.types.BaseTuple
+        Type of the named tuple.
     """
 
     def __init__(self, group):
@@ -32,7 +34,7 @@ class LentGroup(types.Type):
 
 
 def member_type(group, name: str):
-    """Type of a member of a named tuple, or of a lent one."""
+    """Type of the member `name` of a named tuple of the type `group`, which may be a `LentGroup`."""
     if isinstance(group, LentGroup):
         member = group.group.types[group.group.fields.index(name)]
         return LentGroup(member) if hasattr(member, "fields") and isinstance(member, types.BaseTuple) else member
@@ -47,7 +49,7 @@ class _LentModel(models.PrimitiveModel):
 
 @cache
 def _reader(k: int):
-    """Make the intrinsic (group) that reads member k."""
+    """Make the Numba function (group) that reads member number `k` of a lent named tuple."""
 
     @intrinsic
     def read(typing_context, group):
@@ -64,9 +66,9 @@ def _reader(k: int):
 
 @cache
 def _declare_member(name: str) -> None:
-    """Let kernels read the member `name` of any group with one."""
+    """Register with Numba that a lent named tuple may have a member `name`, which kernels can read."""
 
-    # Without counts a function may not return an array, unless it was handed it.
+    # Without reference counts a function may return an array only if the array is one of its arguments.
     @overload_attribute(LentGroup, name, strict=False, jit_options=WITH_COUNTS)
     def read_member(group):
         if name not in group.group.fields:
@@ -76,7 +78,10 @@ def _declare_member(name: str) -> None:
 
 
 def declare_members(value) -> None:
-    """Let kernels read the members of all named tuples among arguments, before one is compiled for them."""
+    """Register the members of all named tuples in `value`, nested ones included, for `lend`.
+
+    It must be called before a kernel is compiled for these arguments.
+    """
     if isinstance(value, tuple):
         for name in getattr(value, "_fields", ()):
             _declare_member(name)
@@ -89,7 +94,7 @@ def _index(context, k: int):
 
 
 def _words(type_) -> int:
-    """Approximate number of words of a value."""
+    """Approximate number of words of a value of this type."""
     if isinstance(type_, types.BaseTuple):
         return sum(map(_words, type_))
     return 5 + 2 * type_.ndim if isinstance(type_, types.Array) else 1
@@ -101,7 +106,10 @@ def _is_large(type_) -> bool:
 
 @intrinsic
 def lend(typing_context, arguments):
-    """Lend a tuple of arguments; it is valid while the lending kernel runs."""
+    """Lend a tuple of arguments to other kernels: large named tuples in it become addresses.
+
+    The result is valid while the lending kernel runs.
+    """
     result = types.Tuple([LentGroup(each) if _is_large(each) else each for each in arguments])
 
     def lower(context, builder, sig, args):

@@ -1,8 +1,8 @@
 """Options of `numba.njit` that turn reference counts off and on.
 
-Numba counts the references to an array, in each function that gets it. A kernel allocates nothing and owns nothing, so
-a step needs no count; a tower takes three times as long with counts. The option is not documented by Numba. All
-releases from 0.61 on have it; if one refuses it, kernels count.
+Numba counts the references to an array in each function that gets it. A kernel neither allocates nor owns arrays, so a
+step needs no counts; with them a step of a tower takes three times as long. Numba does not document the option. All
+releases from 0.61 on have it; with a release that refuses it, kernels count references.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numba
 
 
 def _nothing() -> None:
-    """Do nothing, in place of a kernel."""
+    """Do nothing; it is compiled as a test of the option."""
 
 
 def _knows_option() -> bool:
-    """True if Numba knows the option; only the compilation of an empty function shows it."""
+    """True if Numba accepts the option, found by compiling an empty function with it."""
     try:
         numba.njit("void()", _nrt=False)(_nothing)
     except KeyError:

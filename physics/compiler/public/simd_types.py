@@ -1,7 +1,7 @@
-"""Four numbers at once as a type of Numba; `physics.compiler.simd` defines each operation.
+"""Lanes, four numbers at once, as a type of Numba; `physics.compiler.simd` defines the meaning of each operation.
 
-Each operation is written out for the four numbers, in the order in which it is without a compiler: the bits are the
-same. LLVM makes vectors of them where it sees fit.
+Each operation is written as four operations on numbers, in the same order as in `simd`, so that the bits are the same.
+LLVM may make vector instructions of them.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ OPTIONS = {"error_model": "numpy", "nogil": True, **WITHOUT_COUNTS}
 
 
 class LanesType(types.Type):
-    """Type of four numbers, or of four truth values.
+    """Numba type of `Lanes`: four numbers, or four truth values.
 
     Parameters
     ----------
     dtype : numba.types.Type
-        Of each.
+        Type of each of the four.
     """
 
     def __init__(self, dtype):
@@ -46,7 +46,7 @@ for _name in "abcd":
 
 @intrinsic
 def _make(typing_context, a, b, c, d):
-    """Four values of one type as lanes."""
+    """Make lanes of four values of one type, in a kernel."""
     made = LanesType(a)
 
     def lower(context, builder, sig, args):
@@ -63,7 +63,7 @@ def _is_lanes(type_) -> bool:
 
 
 def _are_lanes(*args) -> bool:
-    """True for lanes, or lanes and numbers, at least one of the former."""
+    """True if these types are lanes and numbers, with lanes at least once."""
     return any(map(_is_lanes, args)) and all(_is_lanes(each) or isinstance(each, types.Number) for each in args)
 
 
@@ -82,7 +82,7 @@ def _lanes(a, b, c, d):
 
 
 def _one_of_four(read: Callable) -> Callable:
-    """Make the kernel (x) that reads one of four numbers; a number beside lanes is returned as it is."""
+    """Make the kernel (x) that reads one number of lanes by `read`; if x is a plain number, it returns x."""
 
     def one(x):
         return read(x)
@@ -109,7 +109,7 @@ def _get(x, k):
 
 
 def _of_each(function: Callable, of: Callable) -> None:
-    """Register `function` of lanes as `of` applied to each lane."""
+    """Register with Numba that `function` of lanes is `of` applied to each lane."""
 
     @_overloaded(function)
     def choose(x):
@@ -119,7 +119,7 @@ def _of_each(function: Callable, of: Callable) -> None:
 
 
 def _of_two(function: Callable, of: Callable) -> None:
-    """Register `function` of lanes, or of lanes and a number, as `of` applied to each pair."""
+    """Register with Numba that `function` of two lanes, or of lanes and a number, is `of` applied to each pair."""
 
     @_overloaded(function)
     def choose(x, y):

@@ -1,1 +1,1 @@
-"""Scenes as MJCF, the format of MuJoCo."""
+"""Reading and writing of scenes as MJCF, the format of MuJoCo's models."""

@@ -1,4 +1,4 @@
-"""Free bodies of a compiled model: a body with a free joint, and all bodies fixed to it."""
+"""Free bodies of a model compiled by MuJoCo: each is a body with a free joint, and all bodies fixed to it."""
 
 from __future__ import annotations
 
@@ -19,25 +19,27 @@ from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
 
 SHAPES = ("box", "sphere", "ellipsoid", "mesh")
-TURNED = ("box", "ellipsoid")  # their axes are the body's in a scene
+TURNED = ("box", "ellipsoid")  # shapes whose axes become the body axes in a scene
 
-# MuJoCo finds principal axes by an iteration, older versions to 2e-7: a tensor that is the file's to this share is the
-# file's.
+# MuJoCo finds principal axes by an iteration, older versions to 2e-7. If its tensor agrees with that of the file to
+# this share, the tensor of the file is used.
 DIAGONALISED = 1e-6
-# It keeps the corners of a mesh in single precision: points of the file that are this near, by size, are the same.
+# MuJoCo keeps the corners of a mesh in single precision. Points of the file that agree with them to this share of the
+# size are used instead.
 SINGLE = 1e-6
 
 
 class BodyElements(NamedTuple):
-    """A body of the scene, and its elements in the model.
+    """Body of a scene, and the numbers of the elements of the MuJoCo model from which it was made.
 
     Attributes
     ----------
     body : Body
+        Body of the scene.
     root, joint, geom : int
-        The model's body, its free joint, and the geom that is its shape.
+        Numbers of the model's body, of its free joint, and of the geom that is its shape.
     is_centred : bool
-        The joint is at the centre of mass.
+        Whether the joint is at the centre of mass.
     """
 
     body: Body
@@ -48,7 +50,7 @@ class BodyElements(NamedTuple):
 
 
 def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[BodyElements]:
-    """All free bodies that a scene can hold, in their order."""
+    """Convert all free bodies of a model that a scene can hold, in their order; other bodies are added to `left`."""
     found = []
     for number, root in enumerate(_free_roots(model, left)):
         try:
@@ -59,12 +61,12 @@ def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[BodyEle
 
 
 def parts_of(model: Model, root: int) -> list[int]:
-    """Body of a free joint, and all bodies fixed to it."""
+    """Numbers of the model's body `root`, which has a free joint, and of all bodies fixed to it."""
     return np.flatnonzero(model.data.body_weldid == root).tolist()
 
 
 def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
-    """Bodies with a free joint and no other joint in their tree; trees with other joints are left out."""
+    """Iterate over the numbers of bodies with a free joint and no other joint in their tree; add others to `left`."""
     m = model.data
     kinds = [model.kind("mjtJoint", "mjJNT_", kind) for kind in m.jnt_type]
     trees = m.body_rootid[m.jnt_bodyid].tolist()
@@ -105,7 +107,7 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Body
 
 
 def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
-    """Pose (7,) and velocity (6,) of the first keyframe; without one, the model's pose at rest."""
+    """Pose (7,) and velocity (6,) of a free joint in the model's first keyframe, or in its initial state at rest."""
     m = model.data
     q, v = int(m.jnt_qposadr[joint]), int(m.jnt_dofadr[joint])
     if m.nkey:
@@ -114,7 +116,7 @@ def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int:
-    """The single geom of a body that can touch others, or its only geom."""
+    """Number of the geom that is the shape of a body: the only one of its `parts` that can touch, or its only geom."""
     m = model.data
     geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
     able = [g for g in geoms if touching.may_touch(g)]
@@ -125,7 +127,7 @@ def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int
 
 
 def _mass_properties(model: Model, parts: list[int]) -> MassProperties:
-    """Mass, centre of mass and inertia of parts in the frame of their joint."""
+    """Mass, centre of mass and inertia of bodies `parts` that are fixed to each other, in the frame of their joint."""
     m = model.data
     found = [
         MassProperties(m.body_mass[b], m.body_ipos[b], _tensor(model, b)).placed(*_placing(model, b))
@@ -140,7 +142,10 @@ def _placing(model: Model, b: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _tensor(model: Model, b: int) -> np.ndarray:
-    """Inertia (3, 3) about the centre of mass in the body's frame, with the file's own digits where it states them."""
+    """Inertia tensor (3, 3) [kg m²] of body `b` about its centre of mass, along the axes of the model's body.
+
+    If the file states a tensor, it is returned with the digits of the file.
+    """
     m, spec = model.data, model.spec("body", b)
     R = rotation_matrices(m.body_iquat[b])
     compiled = R @ np.diag(m.body_inertia[b]) @ R.T
@@ -153,12 +158,15 @@ def _tensor(model: Model, b: int) -> np.ndarray:
 
 
 def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
-    """Half edges, semi-axes, or the radius three times [m]."""
+    """Dimensions (3,) [m] of a geom of MuJoCo's `size`: half edges, semi-axes, or three times the radius."""
     return np.full(3, size[0]) if kind == "sphere" else np.array(size)
 
 
 def _points(model: Model, geom: int) -> np.ndarray:
-    """Corners (n, 3) of a mesh's convex hull in the body's frame [m], with the file's own digits where it has them."""
+    """Corners (n, 3) [m] of the convex hull of a mesh geom, in the frame of the model's body.
+
+    If the file lists the points of the mesh, they are returned with the digits of the file.
+    """
     m, mesh, frame = model.data, int(model.data.geom_dataid[geom]), model.geom_frames[geom]
     corners, stated = _corners(model, mesh), model.stated_points(mesh)
     if stated is not None:
@@ -171,7 +179,7 @@ def _points(model: Model, geom: int) -> np.ndarray:
 
 
 def _corners(model: Model, mesh: int) -> np.ndarray:
-    """Corners (n, 3) of the convex hull of a mesh in its own frame, as MuJoCo keeps it; else all its points."""
+    """Corners (n, 3) [m] of the convex hull of a mesh, in MuJoCo's frame of the mesh; all points if it has no hull."""
     m, start, graph = model.data, int(model.data.mesh_vertadr[mesh]), int(model.data.mesh_graphadr[mesh])
     points = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
     if graph < 0:

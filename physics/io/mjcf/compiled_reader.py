@@ -1,4 +1,4 @@
-"""Convert a model compiled by MuJoCo to a scene."""
+"""Reader of MJCF files by means of MuJoCo: the model that MuJoCo compiles is converted to a scene."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from physics.io.mjcf.text import Element, ModelError
 from physics.io.mjcf.touching import Touching
 from physics.scene.scene import HalfSpace, Scene
 
-# A normal that is the file's to this share is the file's: MuJoCo keeps the rotation of a plane.
+# MuJoCo keeps a plane as a rotation. If its normal agrees with that of the file to this share, the latter is used.
 ROTATED = 1e-9
 
 
 def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, left: LeftOut) -> Scene:
-    """Scene of a model.
+    """Compile an MJCF text with MuJoCo, and convert the model to a scene.
 
     Parameters
     ----------
     mujoco : module
+        The package `mujoco`.
     text, root, path
-        As of `physics.io.mjcf.model.compile_model`.
+        Arguments of `physics.io.mjcf.model.compile_model`.
     left : LeftOut
-        Takes what a scene cannot hold.
+        Collects the elements that a scene cannot hold, or raises an error about the first.
     """
     model = compile_model(mujoco, text, root, path)
     for error in forces.absent(model):
@@ -48,7 +49,7 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
 
 
 def _contact(model: Model, touching: Touching, free: list[BodyElements], left: LeftOut) -> tuple[list[int], list]:
-    """Planes that are walls, and effects of contact."""
+    """Find the numbers of the plane geoms that are walls, and the effects `Contact` and `Friction`."""
     bodies = [touching.surface(each.geom) for each in free]
     met = _met_planes(model, touching, dict.fromkeys(bodies), left)
     effects = contact_effects(bodies, [touching.surface(plane) for plane in met], left, touching.friction_of)
@@ -69,7 +70,7 @@ def _fixed_geoms(model: Model) -> list[int]:
 
 
 def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
-    """Fixed planes that a body touches; other fixed geoms with contact are left out."""
+    """Numbers of the fixed plane geoms that a body can touch; other fixed geoms that touch bodies go to `left`."""
     met = []
     for geom in _fixed_geoms(model):
         if not touched(touching.surface(geom), bodies, touching.friction_of):
@@ -85,7 +86,7 @@ def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -
 
 
 def _wall(model: Model, plane: int) -> HalfSpace:
-    """Wall of a plane, whose free side is its +z."""
+    """Make the wall of a plane geom; bodies are on its +z side."""
     frame, spec = model.geom_frames[plane], model.spec("geom", plane)
     wall = HalfSpace(frame.R[:, 2])
     stated = np.array(spec.alt.zaxis) if spec is not None else np.full(3, np.nan)

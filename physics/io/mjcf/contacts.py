@@ -1,7 +1,7 @@
-"""Convert the geoms of a model to the contact and friction of a scene.
+"""Conversion of the contact properties of a MuJoCo model's geoms to the contact and friction of a scene.
 
-In MuJoCo masks of bits and lists of pairs say which geoms touch, and every pair has its own friction. A scene has one
-coefficient, its bodies touch all walls or none, and each other all or none.
+In MuJoCo bit masks and lists of pairs decide which geoms touch, and every pair has its own friction. A scene has one
+coefficient of friction; its bodies touch all walls or none, and all other bodies or none.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ class Surface:
     Attributes
     ----------
     label : str
-        The geom as messages call it; it does not count in comparisons.
+        Name of the geom in messages; comparisons ignore it.
     line : int
-        Its line, likewise.
+        Line of the geom in the file; comparisons ignore it.
     contype, conaffinity : int
-        Masks: two geoms touch if a bit of the one's `contype` is in the other's `conaffinity`.
+        Bit masks: two geoms touch if the `contype` of one and the `conaffinity` of the other have a common bit.
     condim : int
         1: without friction, 3: friction along the surface.
     friction : float
-        Along the surface.
+        Coefficient of friction along the surface.
     priority : int
         The geom of higher priority determines `condim` and `friction` of a pair.
     geom : int
-        Number of a geom that the model's list of pairs, or of excluded bodies, names; else -1.
+        Number of the geom if the model's list of pairs, or of excluded bodies, names it; else -1.
     """
 
     label: str = field(compare=False)
@@ -49,13 +49,13 @@ class Surface:
     geom: int = -1
 
 
-LEAST_FRICTION = 1e-5  # MuJoCo's; a smaller coefficient counts as this
+LEAST_FRICTION = 1e-5  # least coefficient in MuJoCo, which raises smaller ones to it
 
 FrictionOf = Callable[[Surface, Surface], "float | None"]
 
 
 class _Met(NamedTuple):
-    """Surfaces of `count` pairs of geoms, and their friction; None: they do not touch."""
+    """Group of `count` pairs of geoms with the surfaces `a` and `b`, and their friction; None: they do not touch."""
 
     a: Surface
     b: Surface
@@ -64,7 +64,7 @@ class _Met(NamedTuple):
 
 
 def dynamic_friction(a: Surface, b: Surface) -> float | None:
-    """Friction of two geoms by their masks and coefficients; None where they do not touch."""
+    """Friction coefficient of two geoms, from their masks, priorities and coefficients; None if they do not touch."""
     if not (a.contype & b.conaffinity or b.contype & a.conaffinity):
         return None
     highest = max(a.priority, b.priority)
@@ -75,7 +75,7 @@ def dynamic_friction(a: Surface, b: Surface) -> float | None:
 
 
 def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf = dynamic_friction) -> bool:
-    """True if any of the other surfaces touches this one."""
+    """True if `surface` touches any of the `others`; `friction_of` returns None for surfaces that do not touch."""
     return any(friction_of(surface, other) is not None for other in others)
 
 
@@ -85,16 +85,17 @@ def contact_effects(
     left: LeftOut,
     friction_of: FrictionOf = dynamic_friction,
 ) -> list[Any]:
-    """Contact and friction of a scene.
+    """Make the effects `Contact` and `Friction` of a scene; an empty list if nothing touches.
 
     Parameters
     ----------
     bodies, planes : sequence of Surface
-        One of each body, and the walls.
+        Surfaces of the bodies, and of the walls.
     left : LeftOut
-        Takes what differs between pairs: the friction of most pairs is read then, and contact where any touch.
+        Collects the differences between pairs. Where pairs differ in friction the coefficient of most pairs is taken;
+        where only some touch, all do.
     friction_of : callable
-        Friction of two surfaces, None where they do not touch.
+        Returns the friction coefficient of two surfaces, or None if they do not touch.
     """
     number = Counter(bodies)
     at_planes = [_Met(a, b, n, friction_of(a, b)) for a, n in number.items() for b in dict.fromkeys(planes)]
@@ -107,14 +108,14 @@ def contact_effects(
     meet_bodies = _agreed_contact(between, left)
     if not meet_planes and not meet_bodies:
         return []
-    if len(bodies) == 1:  # it meets no other, so that only the masks that it shares with the next one tell
+    if len(bodies) == 1:  # there is no other body: decide as if there were a second one with the same masks
         meet_bodies = friction_of(bodies[0], bodies[0]) is not None
     friction = _agreed_friction(at_planes + between, left)
     return [Contact(between_bodies=meet_bodies)] + ([Friction(friction)] if friction > 0 else [])
 
 
 def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
-    """True if pairs touch; where only some do, the others are left out."""
+    """True if any of these pairs touch; if only some do, a message about the others goes to `left`."""
     touching = [pair for pair in met if pair.friction is not None]
     apart = [pair for pair in met if pair.friction is None]
     if touching and apart:
@@ -130,7 +131,7 @@ def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
 
 
 def _agreed_friction(met: list[_Met], left: LeftOut) -> float:
-    """Friction of all pairs that touch; where it differs, most pairs decide and the rest is left out."""
+    """Friction coefficient that most of the touching pairs have; messages about other coefficients go to `left`."""
     number: Counter[float] = Counter()
     first: dict[float, _Met] = {}
     for pair in met:

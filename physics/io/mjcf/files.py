@@ -1,4 +1,4 @@
-"""Read and write MJCF files: with MuJoCo where it is installed, else by a reader of the files written here."""
+"""Reading and writing of MJCF files; without MuJoCo only files that `save_mjcf` has written can be read."""
 
 from __future__ import annotations
 
@@ -17,22 +17,25 @@ LEAST_MUJOCO = (3, 3, 7)  # version whose `MjSpec` numbers its elements
 
 
 def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
-    """Write a scene for MuJoCo.
+    """Write a scene as an MJCF file for MuJoCo.
 
-    Bodies with mass, inertia, pose and velocity (hulls as meshes), planes, gravity, friction and springs (which
-    `load_mjcf` does not read). The contacts are MuJoCo's soft ones with its defaults, its time step too.
+    The file holds bodies with mass, inertia, pose and velocity (hulls as meshes), planes, gravity, friction, and
+    springs, which `load_mjcf` does not read. MuJoCo will simulate it with its soft contacts and its default time step.
 
     Parameters
     ----------
     scene : Scene
+        Scene to write.
     path : str or Path
+        Path of the file.
     drop : bool
-        Leave out what MJCF cannot express instead of refusing; a comment in the file names it.
+        Whether to leave out effects that MJCF cannot express, instead of refusing the scene. A comment in the file
+        names them.
 
     Raises
     ------
     ValueError
-        Naming the effects that MJCF cannot express, unless `drop`.
+        The scene has effects that MJCF cannot express, and `drop` is False. The message names them.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     validation.path(path)
@@ -46,27 +49,29 @@ def load_mjcf(path: str | Path, drop: Literal[True]) -> tuple[Scene, list[str]]:
 @overload
 def load_mjcf(path: str | Path, drop: bool) -> Scene | tuple[Scene, list[str]]: ...
 def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list[str]]:
-    """Read a scene from MJCF or URDF.
+    """Read a scene from an MJCF or URDF file.
 
-    MuJoCo compiles the file where it is installed, and the compiled model is read: free bodies of one box, sphere,
-    ellipsoid or convex mesh, planes, gravity, one coefficient of friction, one damping of all free joints, and the
-    pose and velocity of the first keyframe. Without MuJoCo the part of MJCF is read that `save_mjcf` writes.
+    If MuJoCo is installed, it compiles the file. The scene gets these parts of the compiled model: free bodies of one
+    box, sphere, ellipsoid or convex mesh, planes, gravity, one coefficient of friction, one damping of all free joints,
+    and the pose and velocity of the first keyframe. Without MuJoCo only elements that `save_mjcf` writes are read.
 
     Parameters
     ----------
     path : str or Path
+        Path of the file.
     drop : bool
-        Leave out what a scene cannot hold instead of refusing, and return a list of it, too. Needs MuJoCo.
+        Whether to leave out elements that a scene cannot hold, instead of refusing the file. Needs MuJoCo.
 
     Returns
     -------
     Scene
-        Or, with `drop`, the scene and the list of what was left out, each with its line where that is known.
+        The scene. With `drop`: the scene, and a list of messages about the elements left out, with their lines where
+        these are known.
 
     Raises
     ------
     ValueError
-        Naming the element that a scene here cannot hold, and its line.
+        The file has an element that a scene cannot hold. The message names it, and its line.
     OSError
         The file cannot be read.
     ModuleNotFoundError
@@ -82,12 +87,15 @@ def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list
 
 
 def from_mjcf(text: str, source: str = "model") -> Scene:
-    """Make the scene of an MJCF text; messages name the text `source`."""
+    """Make a scene from an MJCF text; error messages call the text `source`."""
     return read_mjcf(text, source)[0]
 
 
 def read_mjcf(text: str, source: str, drop: bool = False, path: Path | None = None) -> tuple[Scene, list[str]]:
-    """Scene of a text, and the list of elements left out; files that the model names are searched beside `path`."""
+    """Make a scene from an MJCF text; return it, and messages about the elements left out (if `drop`).
+
+    Errors call the text `source`. Files that the text names, such as meshes, are searched beside `path`.
+    """
     mujoco = find_optional("mujoco", LEAST_MUJOCO)
     if drop and mujoco is None:
         raise missing("mujoco", "load_mjcf with drop=True")

@@ -1,4 +1,4 @@
-"""Forces of a compiled model on its free bodies: gravity, damping, and forces that a scene lacks."""
+"""Forces of a model compiled by MuJoCo: gravity and damping for the scene, and errors for other forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ABSENT = {"tendon": "tendons", "actuator": "actuators", "flex": "deformable bodi
 
 
 def absent(model: Model) -> Iterator[ModelError]:
-    """Elements without a counterpart in a scene."""
+    """Iterate over errors for the elements and options of a model that have no counterpart in a scene."""
     m = model.data
     numbers = {"tendon": m.ntendon, "actuator": model.value("nactuator", m.nu), "flex": m.nflex}
     for kind, number in numbers.items():
@@ -39,18 +39,21 @@ def absent(model: Model) -> Iterator[ModelError]:
 
 
 def _is_passive_off(model: Model) -> bool:
-    """True if all passive forces are disabled, by a flag of older versions or by disabled springs and dampers."""
+    """True if a model disables all passive forces, by a flag of older versions or by disabled springs and dampers."""
     return model.disables("PASSIVE") or (model.disables("SPRING") and model.disables("DAMPER"))
 
 
 def _option_error(model: Model, tag: str, key: str, message: str) -> ModelError:
-    """An error about an attribute of <option> or of an element in it."""
+    """Make the error about the attribute `key` of an element `tag`, such as <option>, with its line."""
     found: list[Element] = [element for element in model.root.iter(tag) if element.get(key) is not None]
     return ModelError(f"<{tag}> {message}", found[-1].line if found else 0)
 
 
 def gravity(model: Model, free: list[BodyElements], left: LeftOut) -> list[Gravity]:
-    """Gravity minus the share of it that the model compensates, if that is equal for all bodies."""
+    """Make the effect `Gravity`, less the share of gravity that the model compensates; an empty list if none is left.
+
+    If bodies compensate different shares, errors go to `left` and gravity acts in full.
+    """
     m = model.data
     if model.disables("GRAVITY"):
         return []
@@ -69,7 +72,10 @@ def gravity(model: Model, free: list[BodyElements], left: LeftOut) -> list[Gravi
 
 
 def damping(model: Model, free: list[BodyElements], left: LeftOut) -> list[Any]:
-    """Linear drag with the damping of the free joints, if that is equal for all."""
+    """Make the effects `Drag` and `AngularDrag` from the damping of the free joints; an empty list if there is none.
+
+    If the damping is not the same for all bodies, errors go to `left` and there is no drag.
+    """
     m = model.data
     found = {each.joint: _damping(model, each.joint) for each in free}
     if model.disables("DAMPER", "PASSIVE") or not any(map(np.any, found.values())):
@@ -87,14 +93,14 @@ def damping(model: Model, free: list[BodyElements], left: LeftOut) -> list[Any]:
 
 
 def _damping(model: Model, joint: int) -> np.ndarray:
-    """Damping of a free joint, and its coefficients of higher order."""
+    """Damping coefficients of a free joint: the linear one, then those of higher order."""
     m = model.data
     dof = int(m.jnt_dofadr[joint])
     return np.append(m.dof_damping[dof], model.value("dof_dampingpoly", np.zeros((m.nv, 0)))[dof])
 
 
 def joint_faults(model: Model, free: list[BodyElements]) -> Iterator[ModelError]:
-    """Properties of free joints that a scene lacks."""
+    """Iterate over errors for the properties of free joints that a scene cannot hold, such as armature."""
     m = model.data
     tables = {
         "armature": m.dof_armature,

@@ -1,4 +1,4 @@
-"""Elements of a model that a scene cannot hold: the first is an error, or all are listed."""
+"""Collector of errors about elements of a model that a scene cannot hold: it raises the first, or lists all."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from physics.io.mjcf.text import ModelError
 
 
 class LeftOut:
-    """Parts of a model that no scene can hold.
+    """Collector of errors about elements of a model that no scene can hold.
 
     Parameters
     ----------
     drop : bool
-        List them instead of raising the first.
+        Whether to list the errors, so that the elements are left out; False raises the first error.
 
     Attributes
     ----------
     messages : list of str
-        What was left out, each with its line.
+        Messages about the elements left out, each with its line where that is known.
     """
 
     def __init__(self, drop: bool = False):
@@ -24,7 +24,7 @@ class LeftOut:
         self.messages: list[str] = []
 
     def add(self, error: ModelError) -> None:
-        """Raise the error, or add it to the list."""
+        """Raise the error, or with `drop` add its message to `messages`."""
         if not self.drop:
             raise ModelError(f"{error}; load_mjcf(path, drop=True) reads the rest", error.line)
         self.messages.append(f"{error.place}: {error}" if error.place else str(error))

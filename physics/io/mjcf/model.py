@@ -1,4 +1,4 @@
-"""A model compiled by MuJoCo: names, lines and frames of its elements."""
+"""Model compiled by MuJoCo: access to its arrays, and names, lines and frames of its elements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.rotations import product, rotation_matrices
 
-# Lists of `mujoco.MjSpec` that hold the elements of a kind.
+# Name of the list of `mujoco.MjSpec` that holds the elements of each kind.
 LISTS = {
     "actuator": "actuators", "body": "bodies", "equality": "equalities", "flex": "flexes", "geom": "geoms",
     "joint": "joints", "pair": "pairs", "tendon": "tendons",
@@ -30,17 +30,17 @@ class Pose(NamedTuple):
     quat: np.ndarray
 
     def __matmul__(self, inner: Pose) -> Pose:
-        """Frame `inner`, given in this frame, in the outer frame of this one."""
+        """Compose two poses: `inner` is given in the frame of this pose, the result in the frame around both."""
         return Pose(self.pos + self.R @ inner.pos, product(self.quat, inner.quat))
 
     @property
     def inverse(self) -> Pose:
-        """Outer frame, given in this frame."""
+        """Inverse pose: the outer frame, given in the inner frame."""
         return Pose(-self.R.T @ self.pos, self.quat * (1, -1, -1, -1))
 
     @property
     def R(self) -> np.ndarray:
-        """(3, 3) rotation matrix."""
+        """Rotation matrix (3, 3), from the inner frame to the outer frame."""
         return rotation_matrices(self.quat)
 
 
@@ -48,23 +48,25 @@ ORIGIN = Pose(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 class Model:
-    """A compiled model.
+    """Model that MuJoCo compiles, with names, lines and frames of its elements.
 
     Parameters
     ----------
     mujoco : module
+        The package `mujoco`.
     spec : mujoco.MjSpec
-        What MuJoCo has read; it is compiled here.
+        Model as MuJoCo has read it; it is compiled here.
     root : Element
-        The same text, for the lines of elements without one in `spec`.
+        Root element of the same text, parsed here, for lines that `spec` does not know.
 
     Attributes
     ----------
     data : mujoco.MjModel
+        The compiled model.
     frames : list of Pose
-        Of each body, in the frame of the moving body that it is fixed to, or of the world.
+        Pose of each body, in the frame of the moving body to which it is fixed, or of the world.
     geom_frames : list of Pose
-        Of each geom, likewise.
+        Pose of each geom, in the frame of the moving body to which it is fixed, or of the world.
     """
 
     def __init__(self, mujoco: ModuleType, spec: Any, root: Element):
@@ -83,37 +85,37 @@ class Model:
         return self.frames[self.data.body_parentid[b]]
 
     def moves(self, b: int) -> bool:
-        """True if the body, or the body that it is fixed to, has a joint."""
+        """True if the body with number `b`, or the body to which it is fixed, has a joint."""
         return bool(self.data.body_dofnum[self.data.body_weldid[b]] > 0)
 
     def value(self, name: str, default: Any) -> Any:
-        """Array of the model, or the default if this version of MuJoCo lacks it."""
+        """Array `name` of the compiled model, or `default` if this version of MuJoCo lacks it."""
         return getattr(self.data, name, default)
 
     def disables(self, *flags: str) -> bool:
-        """True if any of these features is disabled, such as "GRAVITY"."""
+        """True if the model disables any of these features of MuJoCo, such as "GRAVITY"."""
         bits = [getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag}", 0) for flag in flags]
         return any(self.data.opt.disableflags & int(bit) for bit in bits)
 
     def enables(self, flag: str) -> bool:
-        """True if this feature is enabled, such as "OVERRIDE"."""
+        """True if the model enables this feature of MuJoCo, such as "OVERRIDE"."""
         bit = getattr(self._mujoco.mjtEnableBit, f"mjENBL_{flag}", 0)
         return bool(self.data.opt.enableflags & int(bit))
 
     def kind(self, enumeration: str, prefix: str, number: int) -> str:
-        """Name of a value in one of MuJoCo's enumerations, such as the type of a geom."""
+        """Name of the value `number` in one of MuJoCo's enumerations, such as ``box``, without `prefix`."""
         return getattr(self._mujoco, enumeration)(int(number)).name.removeprefix(prefix).lower()
 
     def spec(self, kind: str, k: int) -> Any:
-        """Element `k` of a kind as MuJoCo has read it; None if MuJoCo made the element itself."""
+        """Element number `k` of a kind, such as "geom", in MuJoCo's `MjSpec`; None if MuJoCo added the element."""
         return self._found[kind].get(k)
 
     def name(self, kind: str, k: int) -> str:
-        """Name of an element; empty without one."""
+        """Name of element number `k` of a kind, such as "geom"; "" if it has none."""
         return self._mujoco.mj_id2name(self.data, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), k) or ""
 
     def label(self, kind: str, k: int) -> str:
-        """Element in the words of messages; a nameless part of a body goes by the name of the body."""
+        """Label of element number `k` of a kind in messages; a geom or joint without a name is labelled by its body."""
         name = self.name(kind, k)
         if name or kind not in ("geom", "joint"):
             return label(kind, name)
@@ -121,39 +123,42 @@ class Model:
         return f"{label(kind, name)} of {label('body', self.name('body', body))}" if body else label(kind, name)
 
     def line(self, kind: str, k: int) -> int:
-        """Line of an element; 0 if unknown, as in an included file."""
+        """Line of element number `k` of a kind in the text; 0 if unknown, as in an included file."""
         found = re.search(r"line (\d+)", getattr(self.spec(kind, k), "info", "") or "")
         if not found and kind == "joint":
             return self.line("body", int(self.data.jnt_bodyid[k]))
         return int(found.group(1)) if found else 0
 
     def stated_points(self, mesh: int) -> np.ndarray | None:
-        """Points (n, 3) of a mesh as the text states them; None if it names a file."""
+        """Points (n, 3) of the mesh with this number as the text states them; None if they are in a file."""
         for element in self.root.iter("mesh"):
             if element.get("name") == self.name("mesh", mesh) and element.get("vertex"):
                 return np.array(element.get("vertex", "").split(), dtype=float).reshape(-1, 3)
         return None
 
     def error(self, kind: str, k: int, message: str) -> ModelError:
-        """An error about an element."""
+        """Make the error about element number `k` of a kind; `message` follows the element's label."""
         return ModelError(f"{self.label(kind, k)} {message}", self.line(kind, k))
 
 
 def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | None) -> Model:
-    """Compile a model.
+    """Compile a model with MuJoCo.
 
     Parameters
     ----------
+    mujoco : module
+        The package `mujoco`.
     text : str
+        Text of the model, MJCF or URDF.
     root : Element
-        The same, parsed.
+        Root element of the parsed text.
     path : Path, optional
-        Its file, beside which included files and meshes are looked for.
+        File of the text; included files and meshes are searched beside it.
 
     Raises
     ------
     ValueError
-        MuJoCo's own message.
+        MuJoCo refuses the model; the message holds MuJoCo's own.
     """
     try:
         with _told_warnings(mujoco):
@@ -168,7 +173,7 @@ def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | Non
 
 
 def _refusal(message: str, root: Element) -> ModelError:
-    """Error with MuJoCo's own message, and the value of the attribute that it names."""
+    """Make the error with MuJoCo's `message`, to which the value of the attribute that it names is added."""
     told = ", ".join(line.strip() for line in message.splitlines() if line.strip())
     place, attribute = re.search(r", line (\d+)", told), re.search(r"attribute:? '(\w+)'", told)
     line = int(place.group(1)) if place else 0
@@ -182,7 +187,7 @@ def _refusal(message: str, root: Element) -> ModelError:
 
 @contextlib.contextmanager
 def _told_warnings(mujoco: ModuleType) -> Iterator[None]:
-    """Let MuJoCo warn once in Python instead of in a log file in the working folder."""
+    """Context manager in which MuJoCo's warnings become Python warnings, each once, instead of lines of a log file."""
     before, told = mujoco.get_mju_user_warning(), []
     mujoco.set_mju_user_warning(told.append)
     try:

@@ -1,6 +1,7 @@
-"""Read a scene from an MJCF text without MuJoCo: the part of MJCF that `save_mjcf` writes.
+"""Reader of MJCF texts without MuJoCo, for the part of MJCF that `save_mjcf` writes.
 
-Elements and attributes of `ELEMENTS` are read, those of `HARMLESS` move nothing, and all others are refused.
+Elements and attributes in `ELEMENTS` are read. Those in `HARMLESS_ELEMENTS` and `HARMLESS_ATTRIBUTES` do not affect
+motion and are skipped. All others are refused.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from physics.scene.effects import Gravity
 from physics.scene.scene import HalfSpace, Scene
 
 DENSITY = 1000.0  # MuJoCo's default [kg/m³]
-DEFAULT_GRAVITY = "0 0 -9.81"  # likewise
-DEFAULT_FRICTION = "1 0.005 0.0001"  # likewise: sliding, torsion, rolling
+DEFAULT_GRAVITY = "0 0 -9.81"  # MuJoCo's default [m/s²]
+DEFAULT_FRICTION = "1 0.005 0.0001"  # MuJoCo's defaults for sliding, torsion and rolling
 
 SHAPES = ("box", "sphere", "ellipsoid", "mesh")
 
-# Attributes of each element that is read, and the elements in it.
+# For each element that is read: its attributes, and the elements within it.
 ELEMENTS: dict[str, tuple[str, str]] = {
     "mujoco": ("model", "compiler option worldbody keyframe asset"),
     "compiler": ("angle", ""),
@@ -55,12 +56,12 @@ HARMLESS_ELEMENTS = {
     "visual",
 }
 HARMLESS_ATTRIBUTES = {"group", "material", "rgba"}
-ABSENT = {"actuator", "deformable", "equality", "tendon"}  # MuJoCo reads them, and a scene has no counterpart
-MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which there may be several in another one
+ABSENT = {"actuator", "deformable", "equality", "tendon"}  # elements without a counterpart in a scene
+MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which another one may hold several
 
 
 def read_scene(root: Element) -> Scene:
-    """The scene of a model's root element."""
+    """Make a scene from the root element of an MJCF text; ModelError about the first element that is not read."""
     if root.tag != "mujoco":
         raise _unread(root, "is not read; allowed is <mujoco>")
     _check(root)
@@ -93,7 +94,7 @@ def _error(element: Element, message: str) -> ModelError:
 
 
 def _unread(element: Element, message: str) -> ModelError:
-    """Error about MJCF that only MuJoCo can read."""
+    """Make the error about an element that this reader does not read; it advises to install MuJoCo."""
     return _error(element, f"{message}; load_mjcf reads more where MuJoCo is installed: {INSTALLED_BY['mujoco'][1]}")
 
 
@@ -102,7 +103,7 @@ def _type(geom: Element) -> str:
 
 
 def _check(element: Element) -> None:
-    """Refuse attributes and elements that this reader ignores."""
+    """Raise an error if an element, or any element within it, is not read here or has an attribute that is not."""
     attributes, children = (text.split() for text in ELEMENTS[element.tag])
     for key, value in element.attrib.items():
         if key not in attributes and key not in HARMLESS_ATTRIBUTES:
@@ -124,7 +125,10 @@ def _check(element: Element) -> None:
 
 
 def _numbers(element: Element, key: str, count: int, default: str | None = None, least: int = 0) -> np.ndarray:
-    """`count` numbers of an attribute, or at least `least` of them."""
+    """Read the attribute `key` of an element as `count` finite numbers, or with `least` as `least` to `count` numbers.
+
+    `default` is the text that a missing attribute stands for. Other contents raise a ModelError.
+    """
     text = element.get(key, default)
     several = f"are {least} to {count} finite numbers" if least else f"are {count} finite numbers"
     allowed = "is one finite number" if count == 1 else several
@@ -138,7 +142,7 @@ def _numbers(element: Element, key: str, count: int, default: str | None = None,
 
 
 def _integer(element: Element, key: str, default: int) -> int:
-    """An integer of an attribute."""
+    """Read the attribute `key` of an element as an integer; `default` if the element lacks it."""
     text = element.get(key, str(default))
     try:
         return int(text)
@@ -153,7 +157,7 @@ def _refuse(element: Element, *keys: str) -> None:
 
 
 def _wall(plane: Element) -> HalfSpace:
-    """Wall of a plane, whose free side is its +z."""
+    """Make the wall of a plane geom; bodies are on its +z side."""
     _refuse(plane, "mesh")
     if plane.get("quat") is not None:
         _refuse(plane, "zaxis")
@@ -165,7 +169,7 @@ def _wall(plane: Element) -> HalfSpace:
 
 
 def _unit(element: Element) -> np.ndarray:
-    """The quaternion of an element, normalised: as in MuJoCo it may have any norm but zero."""
+    """Read the quaternion (4,) of an element and normalise it; as in MuJoCo it may have any norm but zero."""
     return _normalised(element, _numbers(element, "quat", 4, "1 0 0 0"))
 
 
@@ -177,7 +181,10 @@ def _normalised(element: Element, q: np.ndarray) -> np.ndarray:
 
 
 def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Pose (7,) and velocity (6,) of each body's frame in the first keyframe, as in qpos and qvel of MuJoCo."""
+    """Pose (7,) and velocity (6,) of each body at the start, in the form of MuJoCo's qpos and qvel.
+
+    They come from the first keyframe if there is one, else from the body elements, at rest.
+    """
     key = root.find("keyframe/key")
     poses = [np.concatenate((_numbers(e, "pos", 3, "0 0 0"), _unit(e))) for e in elements]
     velocities = np.zeros((len(elements), 6))
@@ -190,7 +197,10 @@ def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np
 
 
 def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np.ndarray) -> Body:
-    """Free body; the scene's frame has its axes, and its origin at the centre of mass."""
+    """Make the scene's body from body element number `b`, its pose (7,) and velocity (6,) at the start.
+
+    The axes stay those of the element; the origin moves to the centre of mass.
+    """
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")
@@ -211,7 +221,7 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
 
 
 def _points(geom: Element, meshes: dict) -> np.ndarray:
-    """(n, 3) points of a mesh, in the frame of the geom."""
+    """Points (n, 3) [m] of the mesh of a geom, in the frame of the geom."""
     mesh = meshes.get(geom.get("mesh"))
     if mesh is None:
         known = ", ".join(map(repr, meshes)) or "none"
@@ -221,12 +231,12 @@ def _points(geom: Element, meshes: dict) -> np.ndarray:
 
 
 def _half_axes(geom: Element) -> np.ndarray:
-    """Half edges, semi-axes, or the radius three times [m]."""
+    """Dimensions (3,) [m] of a geom: half edges, semi-axes, or three times the radius."""
     return np.resize(_numbers(geom, "size", 1 if _type(geom) == "sphere" else 3), 3)
 
 
 def _mass_properties(element: Element, geom: Element, shape: np.ndarray) -> MassProperties:
-    """Mass, centre of mass and inertia in the body's frame."""
+    """Mass, centre of mass and inertia tensor of a body element, in its frame; from its geom if it states none."""
     inertial = element.find("inertial")
     if inertial is None:
         return _of_geom(geom, shape)
@@ -242,7 +252,7 @@ def _mass_properties(element: Element, geom: Element, shape: np.ndarray) -> Mass
 
 
 def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
-    """Mass properties of a geom of uniform density."""
+    """Mass properties of a geom with uniform density, in the frame of its body."""
     if _type(geom) == "mesh":
         raise _unread(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
     is_box = _type(geom) == "box"

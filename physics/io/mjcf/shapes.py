@@ -1,4 +1,4 @@
-"""Make bodies of a scene from masses and geoms of a model, in other frames."""
+"""Conversion of a model's geoms and masses, in the frames of the model's bodies, to bodies of a scene."""
 
 from __future__ import annotations
 
@@ -12,24 +12,26 @@ from physics.mass.polyhedron import convex_hull
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 
-# Inertia of the uniform body, and a geom at the centre of mass, to rounding of a text and of rotations there and back.
+# Share to which an inertia counts as that of uniform density, and a geom as at the centre of mass: the rounding errors
+# of a text, and of rotations there and back.
 UNIFORM = 1e-12
-# Likewise of meshes, whose corners MuJoCo keeps in single precision.
+# The same for meshes, whose corners MuJoCo keeps in single precision.
 UNIFORM_HULL = 1e-6
 
 
 class Placed(NamedTuple):
-    """A geom of a free body, and the body's mass, both in the frame of the model's body.
+    """Geom of a free body, and the body's mass properties, in the frame of the model's body.
 
     Attributes
     ----------
     kind : str
-        "box", "sphere", "ellipsoid" or "mesh".
+        Kind of the geom: "box", "sphere", "ellipsoid" or "mesh".
     shape : (3,) or (n, 3) float64
-        Half edges, semi-axes or the radius three times; or points of a mesh from `pos` on [m].
+        Half edges, semi-axes, or three times the radius [m]. Of a mesh its points relative to `pos` [m].
     pos : (3,) float64
-        Centre of the geom [m]. Its axes are the body's.
+        Centre of the geom [m]. Its axes are those of the body.
     mass : MassProperties
+        Mass, centre of mass and inertia of the body.
     """
 
     kind: str
@@ -39,21 +41,23 @@ class Placed(NamedTuple):
 
 
 def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str | None) -> Body:
-    """Body of a scene: its frame has the axes of the model's body, and its origin at the centre of mass.
+    """Make a body of a scene; its frame has the axes of the model's body, and its origin at the centre of mass.
 
     Parameters
     ----------
     placed : Placed
+        Geom and mass properties of the model's body.
     pose : (7,) float64
         Origin [m] and unit quaternion of the model's body in the world.
     velocity : (6,) float64
-        Velocity of that origin in the world [m/s], and angular velocity in the body's frame [rad/s].
+        Velocity of that origin in the world frame [m/s], and angular velocity in the body's frame [rad/s].
     name : str, optional
+        Name of the body.
 
     Raises
     ------
     ValueError
-        The scene has no such body.
+        A scene cannot hold such a body; the message names the reason.
     """
     R, centre = rotation_matrices(pose[3:]), placed.mass.centre
     start = {
@@ -69,7 +73,7 @@ def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str 
 
 
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:
-    """Make a box, sphere or ellipsoid; its inertia is stated if it is not that of uniform density."""
+    """Make a box, sphere or ellipsoid; `inertia_body` is given if the inertia is not that of uniform density."""
     half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
     moments = block_moments(2 * half, mass) if placed.kind == "box" else ellipsoid_moments(half, mass)
     is_uniform = _is_near(placed.mass.inertia, np.diag(moments), UNIFORM)
@@ -87,12 +91,12 @@ def _convex(placed: Placed, start: dict[str, Any]) -> Body:
 
 
 def _is_rounding(arm: np.ndarray, placed: Placed) -> bool:
-    """True if a geom is at the centre of mass, to rounding of its place and size."""
+    """True if `arm`, from the centre of mass to a geom, is zero up to rounding of the geom's place and size."""
     return bool(np.abs(arm).max() <= UNIFORM * max(np.abs(placed.pos).max(), placed.shape.max()))
 
 
 def _hull(placed: Placed, start: dict[str, Any]) -> Body:
-    """Make the convex hull of points; its own centre of mass must be the body's."""
+    """Make a hull; ValueError unless the centre of mass of its uniform shape is that of the body."""
     mass, points = placed.mass.mass, tuple(map(tuple, (placed.pos + placed.shape).tolist()))
     fault = _hull_fault(points)
     if fault:
@@ -111,7 +115,7 @@ def _hull(placed: Placed, start: dict[str, Any]) -> Body:
 
 @lru_cache(maxsize=64)
 def _hull_fault(points: tuple) -> str:
-    """Reason why points have no hull here, else empty; the result is cached, since bodies share their mesh."""
+    """Message of `convex_hull` about points that it refuses, else ""; cached, since several bodies may share a mesh."""
     try:
         convex_hull(points)
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Elements of an MJCF text, each with its line."""
+"""Parser of MJCF texts: XML elements that know their lines, and errors that name them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from xml.parsers import expat
 
 
 class Element(ET.Element):
-    """An element, and the line on which it starts."""
+    """XML element with `line`, the number of the line on which it starts."""
 
     line = 0
 
@@ -18,8 +18,9 @@ class ModelError(ValueError):
     Parameters
     ----------
     message : str
+        Message of the error.
     line : int
-        Line of the element; 0 where it is not known.
+        Line of the element; 0 if unknown.
     """
 
     def __init__(self, message: str, line: int = 0):
@@ -28,18 +29,18 @@ class ModelError(ValueError):
 
     @property
     def place(self) -> str:
-        """Line in words; empty if unknown."""
+        """Line of the element in words, as "line 3"; "" if unknown."""
         return f"line {self.line}" if self.line else ""
 
 
 def parse(text: str) -> Element:
-    """Root element of a text.
+    """Parse an MJCF text; return its root element.
 
     Raises
     ------
     ValueError
-        The text is no XML, or has a document type, which declares entities: they could grow without bound, or name
-        other files.
+        The text is no XML, or has a document type. A document type declares entities, which could grow without bound,
+        or name other files.
     """
     parser = expat.ParserCreate("utf-8")
     builder = ET.TreeBuilder(element_factory=Element)
@@ -62,5 +63,5 @@ def _refuse_doctype(name: str, *_: object) -> None:
 
 
 def label(tag: str, name: str | None) -> str:
-    """Element in the words of messages."""
+    """Label of an element in messages, with its name if it has one: ``<geom 'floor'>``."""
     return f"<{tag} {name!r}>" if name else f"<{tag}>"

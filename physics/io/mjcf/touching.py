@@ -1,4 +1,4 @@
-"""Contact of a compiled model's geoms: friction of pairs, and properties that a scene cannot hold."""
+"""Contact between the geoms of a model compiled by MuJoCo: friction of pairs, and errors for other properties."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction
 from physics.io.mjcf.model import Model
 from physics.io.mjcf.text import ModelError
 
-# MuJoCo's defaults; contacts that are at least as hard and as damped count as rigid.
+# MuJoCo's defaults. A contact that is at least as hard and as damped as these counts as rigid.
 TIME_CONSTANT, DAMPING_RATIO = 0.02, 1.0
 IMPEDANCE = (0.9, 0.95)
 
 
 class Touching:
-    """Contact between the geoms of a model.
+    """Contact between the geoms of a model: which pairs touch, with which friction.
 
     Parameters
     ----------
     model : Model
+        Model compiled by MuJoCo.
     """
 
     def __init__(self, model: Model):
@@ -35,12 +36,12 @@ class Touching:
         self._special = self._told | {g for g in range(m.ngeom) if int(m.geom_bodyid[g]) in bodies}
 
     def may_touch(self, geom: int) -> bool:
-        """True unless the geom is only visible, and nothing can touch it."""
+        """True if anything can touch the geom with this number; False for geoms that are only visible."""
         m = self._model.data
         return bool(m.geom_contype[geom] or m.geom_conaffinity[geom] or geom in self._told)
 
     def surface(self, geom: int) -> Surface:
-        """Properties of a geom in contact."""
+        """Contact properties of the geom with this number."""
         m = self._model.data
         friction = m.opt.o_friction[0] if self._overrides else m.geom_friction[geom, 0]
         return Surface(
@@ -53,7 +54,7 @@ class Touching:
         )
 
     def friction_of(self, a: Surface, b: Surface) -> float | None:
-        """Friction of two surfaces; None where they do not touch."""
+        """Friction coefficient of two surfaces; None if they do not touch."""
         if self._is_off:
             return None
         pair = self._pair(a, b)
@@ -75,7 +76,7 @@ class Touching:
         return a.geom != b.geom and frozenset(map(int, (bodies[a.geom], bodies[b.geom]))) in self._excluded
 
     def faults(self, geoms: Iterable[int]) -> Iterator[ModelError]:
-        """Properties of these touching geoms that are neither rigid contact nor plain friction."""
+        """Iterate over errors for the contact properties of these geoms that a scene cannot hold, such as softness."""
         known = set(geoms)
         for geom in sorted(known):
             for told in self._geom_faults(geom):
@@ -122,7 +123,10 @@ def _resistance(condim: int) -> Iterator[str]:
 
 
 def _softness(solref: np.ndarray, solimp: np.ndarray, margin: float, gap: float) -> Iterator[str]:
-    """Parameters of a contact that is softer or less damped than MuJoCo's default, or acts at a distance."""
+    """Iterate over messages about a contact that is softer or less damped than MuJoCo's default, or acts at a distance.
+
+    The arguments are MuJoCo's contact parameters of these names.
+    """
     time, ratio = solref
     if not (time > 0 and ratio >= DAMPING_RATIO and time * ratio <= TIME_CONSTANT):
         allowed = f"a damping ratio of at least {DAMPING_RATIO:g}, and a product of at most {TIME_CONSTANT:g} s"

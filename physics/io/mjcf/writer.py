@@ -1,7 +1,8 @@
-"""Convert a scene to MJCF, as far as MuJoCo can express it.
+"""Writer of scenes as MJCF texts.
 
-Frames: a body's frame here is at its centre of mass, so the exported bodies have `inertial pos="0 0 0"`. A free joint
-turns in the body's frame there, in the world's here; the start velocities stand in a keyframe `start`.
+The frame of a scene's body has its origin at the centre of mass, so the written bodies have `inertial pos="0 0 0"`.
+MuJoCo gives the angular velocity of a free joint in the body frame, a scene in the world frame; it is converted here.
+The velocities at the start are in a keyframe `start`.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ KEYFRAME = "start"
 
 
 def unnamed(b: int) -> str:
-    """MJCF name of body `b` of a scene if the body has no name."""
+    """Name in MJCF of body number `b` of a scene if it has no name of its own."""
     return f"body{b}"
 
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
-    """Text of the file that `save_mjcf` writes."""
+    """Make the MJCF text of a scene; see `save_mjcf` for its contents and for `drop`."""
     lost = _inexpressible(scene)
     if lost and not drop:
         raise ValueError(f"MJCF cannot express {', '.join(map(repr, lost))}; pass drop=True to leave that out")
@@ -55,7 +56,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 
 def _check_names(scene: Scene) -> None:
-    """Refuse a body's name that the file gives to a nameless body."""
+    """Raise a ValueError if a body has the name that the file gives to a body without a name."""
     taken = {unnamed(b): b for b, body in enumerate(scene.bodies) if body.name is None}
     for b, body in enumerate(scene.bodies):
         if body.name in taken:
@@ -66,7 +67,7 @@ def _check_names(scene: Scene) -> None:
 
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
-    """Add the hulls' corners, relative to their centres of mass."""
+    """Add a mesh element for each hull, with its corners relative to its centre of mass."""
     hulls: dict[str, Any] = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
     assets: Any = ET.SubElement(root, "asset") if hulls else None
     for name, body in hulls.items():
@@ -82,12 +83,15 @@ def _inexpressible(scene: Scene) -> list:
 
 
 def _text(numbers) -> str:
-    """Numbers as text, exact to the last bit."""
+    """Write numbers as text with all digits, separated by blanks."""
     return " ".join(repr(float(number)) for number in np.ravel(numbers))
 
 
 def _surface(scene: Scene) -> dict[str, str]:
-    """Friction of all geoms: MuJoCo takes the larger of two. condim 1 means none; 0 would count as 1e-5."""
+    """Attributes of all geoms for the scene's friction.
+
+    Without friction they are condim 1, since MuJoCo would raise a coefficient of 0 to 1e-5.
+    """
     friction = scene.effect(Friction)
     if friction is None or friction.axis is not None or friction.coefficient == 0:
         return {"condim": "1"}
@@ -95,7 +99,7 @@ def _surface(scene: Scene) -> dict[str, str]:
 
 
 def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:
-    """One free body; its frame is that of the scene's body."""
+    """Add the element of body number `b`, a free body in the frame of the scene's body, and sites for its springs."""
     element = ET.SubElement(world, "body", name=body.name or unnamed(b), pos=_text(body.pos), quat=_text(body.quat))
     ET.SubElement(element, "freejoint")
     I = body.inertia
@@ -117,7 +121,7 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
 
 
 def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> None:
-    """Add springs: straight tendons to a site of the body, from a site of the world or of another body."""
+    """Add springs as straight tendons: each from a site of the world, or of another body, to a site of its body."""
     tendons = ET.SubElement(root, "tendon")
     for k, spring in enumerate(springs):
         if spring.other is None:
