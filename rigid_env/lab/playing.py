@@ -8,14 +8,16 @@ from pathlib import Path
 import gymnasium as gym
 
 from rigid_env.envs.policy_files import load_policy
-from rigid_env.rendering.picture import write_gif
+from rigid_env.rendering.picture import GIF_COLOURS, write_gif
 
 SIZE = (480, 300)  # width and height of the pictures [px]
 FRAME_TIME = 0.05  # between pictures: an exact number of hundredths, in which a GIF counts [s]
 STILL = 10  # times that the last picture of an episode is shown
 
 
-def write_video(env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "balanced") -> list[str]:
+def write_video(
+    env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "balanced", size=SIZE, colours: int = GIF_COLOURS
+) -> list[str]:
     """Write an animated GIF of one episode for each seed.
 
     Parameters
@@ -25,6 +27,10 @@ def write_video(env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "
     path : Path
     seeds : iterable of int
     accuracy : str
+    size : tuple of int
+        Width and height of the pictures [px].
+    colours : int
+        Of the pictures: fewer make a smaller file.
 
     Returns
     -------
@@ -37,7 +43,7 @@ def write_video(env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "
         If the environment has no trained policy.
     """
     policy = load_policy(env_id)
-    width, height = SIZE
+    width, height = size
     env = gym.make(env_id, render_mode="rgb_array", width=width, height=height, accuracy=accuracy)
     pictures, outcomes = [], []
     for seed in seeds:
@@ -45,7 +51,7 @@ def write_video(env_id: str, path: Path, seeds: Iterable[int], accuracy: str = "
         pictures += found + found[-1:] * STILL
         outcomes.append(outcome)
     env.close()
-    write_gif(path, pictures, 1.0 / FRAME_TIME)
+    write_gif(path, pictures, 1.0 / FRAME_TIME, colours)
     return outcomes
 
 

@@ -128,7 +128,7 @@ def write_png(path: Path, picture: np.ndarray) -> None:
     _image_class().fromarray(picture).save(path)
 
 
-def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float) -> None:
+def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float, colours: int = GIF_COLOURS) -> None:
     """Write pictures (height, width, 3) uint8 as an animated GIF that plays for ever.
 
     Parameters
@@ -137,10 +137,12 @@ def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float) -> None:
     pictures : sequence
     fps : float
         A GIF counts in hundredths of a second: 25, 50 and 100 are played exactly [1/s].
+    colours : int
+        Of all pictures together.
     """
     images = [_image_class().fromarray(picture) for picture in pictures]
-    palette = images[len(images) // 2].quantize(GIF_COLOURS)
-    images = [image.quantize(GIF_COLOURS, palette=palette, dither=0) for image in images]
+    palette = images[len(images) // 2].quantize(colours)
+    images = [image.quantize(colours, palette=palette, dither=0) for image in images]
     images[0].save(path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0)
 
 

@@ -1,0 +1,172 @@
+"""Write the pages of the environments: ``python -m benchmarks.environment_pages [ENV ...] [--pictures]``.
+
+A page is made of an environment's own documentation and of what `agents.suite` kept in ``benchmarks/results/suite``;
+nothing is trained. With ``--pictures`` the trained policy that comes with an environment is played for a picture that
+moves, and the learning curves are drawn.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import gymnasium as gym
+import typer
+
+import rigid_env  # noqa: F401 (registers)
+from agents.suite import JUDGED_EPISODES, RESULTS, aggregate, read_results, short_name
+from benchmarks import machine
+from physics.accuracy import PRESETS
+from rigid_env.envs.pretrained import pretrained_ids
+from rigid_env.envs.registration import GOALS, MAX_EPISODE_STEPS, NAMESPACE, SUITE
+from rigid_env.terminal import make_console
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = DOCS / "environments"
+PICTURES = PAGES / "images"
+PICTURE_SEEDS = (0, 1)
+SIZE = (280, 175)  # of a moving picture [px]
+
+HEAD = "<!-- written by python -m benchmarks.environment_pages -->"
+
+
+def all_ids() -> list[str]:
+    """Return the ids of all environments that have a page, in the order of the list."""
+    return [f"{NAMESPACE}/{name}-v0" for name in (*MAX_EPISODE_STEPS, *SUITE, *GOALS)]
+
+
+def page_of(env_id: str) -> Path:
+    """Return the file of an environment's page."""
+    return PAGES / f"{short_name(env_id)}.md"
+
+
+def page(env_id: str, results: Path = RESULTS) -> str:
+    """Return the page of an environment as Markdown."""
+    env = gym.make(env_id)
+    described = env.unwrapped.describe()
+    env.close()
+    found, floors = read_results(results, env_id)
+    parts = [HEAD, f"# {short_name(env_id)}", _picture(env_id), described.strip()]
+    if found or floors:
+        parts.append("\n\n".join(["## Results", *_results(env_id, found, floors)]))
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _picture(env_id: str) -> str:
+    path = PICTURES / f"{short_name(env_id)}.gif"
+    return f"![A trained agent](images/{path.name})" if path.is_file() else ""
+
+
+def _results(env_id: str, found: Sequence[dict[str, Any]], floors: dict[str, Any]) -> list[str]:
+    rows = [
+        (each["algo"], each["seed"], _rate(each["evaluation"]), f"{each['steps'] / 1e6:.2f}",
+         f"{each['training_seconds']:.0f}")
+        for each in found if each["is_default"]
+    ]  # fmt: skip
+    rows += [(name, "", _rate(floor), "", "") for name, floor in floors.items()]
+    parts = [machine.markdown_table(["policy", "seed", "success of 1,000 fresh episodes", "M steps", "s"], rows)]
+    parts += [_whole(algo, [each for each in found if each["is_default"] and each["algo"] == algo])
+              for algo in sorted({each["algo"] for each in found if each["is_default"]})]  # fmt: skip
+    curve = PICTURES / f"{short_name(env_id)}-curve.png"
+    parts += [f"![Learning curves](images/{curve.name})"] if curve.is_file() else []
+    judged = [each for each in found if each.get("judged")]
+    if judged:
+        parts += [
+            f"Trained at one accuracy, judged at another: success of {JUDGED_EPISODES} episodes.",
+            machine.markdown_table(
+                ["trained at", "seed", *PRESETS],
+                [(_accuracy(each), each["seed"], *(f"{each['judged'][name]['success_rate']:.1%}" for name in PRESETS))
+                 for each in judged],
+            ),
+        ]  # fmt: skip
+    if found:
+        parts.append(f"`python -m agents.suite {env_id}` on {machine.headline(found[0]['machine'])}.")
+    if env_id in pretrained_ids():
+        parts.append(f"A trained policy comes with the package: `rigid-env play {env_id}`.")
+    return parts
+
+
+def _rate(evaluation: dict[str, Any]) -> str:
+    low, high = evaluation["interval"]
+    return f"{evaluation['success_rate']:.1%} ({100 * low:.1f} to {100 * high:.1f})"
+
+
+def _whole(algo: str, found: Sequence[dict[str, Any]]) -> str:
+    """Return the sentence that sums up the seeds of an algorithm; none for a single one."""
+    if len(found) < 2:
+        return f"One seed of {algo} was run: it says little about others."
+    whole = aggregate(found)
+    low, high = whole["interval"]
+    return (
+        f"Interquartile mean of {whole['seeds']} seeds of {algo}: {whole['success']:.1%} "
+        f"({100 * low:.1f} to {100 * high:.1f}, bootstrap, 95 %), after {whole['seconds']:.0f} s."
+    )
+
+
+def _accuracy(result: dict[str, Any]) -> str:
+    value = result["accuracy"]
+    return value if isinstance(value, str) else ", ".join(f"{name} {number:g}" for name, number in value.items())
+
+
+def index() -> str:
+    """Return the list of all environments, with a line about each."""
+    rows = []
+    for env_id in all_ids():
+        text = page_of(env_id).read_text(encoding="utf-8")
+        first = re.search(r"## Description\n\n(.+?\.)(?:\s|$)", text, re.DOTALL)
+        about = " ".join(first[1].split()) if first else ""
+        rate = re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+ %|[\d.]+%)", text, re.MULTILINE)
+        rows.append((f"[{short_name(env_id)}]({short_name(env_id)}.md)", about, rate[1] if rate else ""))
+    table = machine.markdown_table(["environment", "what the agent does", "trained"], rows)
+    return f"{HEAD}\n\n# Every environment\n\n{table}\n"
+
+
+def draw_pictures(env_id: str, results: Path) -> None:
+    """Play a trained policy, and draw the learning curves, for a page."""
+    from rigid_env.lab.playing import write_video
+
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    if env_id in pretrained_ids():
+        write_video(env_id, PICTURES / f"{short_name(env_id)}.gif", PICTURE_SEEDS, size=SIZE, colours=32)
+    found, _ = read_results(results, env_id)
+    if any(each["is_default"] for each in found):
+        _draw_curves([each for each in found if each["is_default"]], PICTURES / f"{short_name(env_id)}-curve.png")
+
+
+def _draw_curves(found: Sequence[dict[str, Any]], path: Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(4.5, 2.8), layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    for each in found:
+        points = [point for point in each["curve"] if point["success_rate"] is not None]
+        xs, ys = [point["steps"] / 1e6 for point in points], [point["success_rate"] for point in points]
+        axis.plot(xs, ys, label=f"{each['algo']}, seed {each['seed']}")
+    axis.set(xlabel="million steps", ylabel="success, exploring", ylim=(-0.02, 1.02))
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize="small")
+    figure.savefig(path, dpi=80)
+
+
+def main(
+    env: Annotated[list[str] | None, typer.Argument(help="Gymnasium ids; none: all.")] = None,
+    pictures: Annotated[bool, typer.Option("--pictures", help="Draw pictures anew, too.")] = False,
+    results: Annotated[Path, typer.Option(help="Folder of the files of results.")] = RESULTS,
+) -> None:
+    """Write the pages of the environments."""
+    PAGES.mkdir(parents=True, exist_ok=True)
+    console = make_console()
+    for env_id in env or all_ids():
+        if pictures:
+            draw_pictures(env_id, results)
+        page_of(env_id).write_text(page(env_id, results), encoding="utf-8")
+        console.print(f"written     {page_of(env_id)}", soft_wrap=True)
+    (PAGES / "README.md").write_text(index(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    typer.run(main)
