@@ -1,4 +1,5 @@
-"""Entries of the observations of the block's tasks, as the environments' docstrings have them."""
+"""Entries of the observations of the block's tasks, with the names, units and bounds of the environments' docstrings.
+"""
 
 from __future__ import annotations
 
