@@ -59,8 +59,7 @@ class Vector(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Unit of the vector's numbers for tables, where m is the mass of the body, g gravity, and a the body's reach.
-        """
+        """Unit of the vector's numbers for tables, where m is the body's mass, g gravity, and a the body's reach."""
         return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
 
     @property

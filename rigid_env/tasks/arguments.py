@@ -1,5 +1,4 @@
-"""Groups of constructor arguments as dataclasses, so that several constructors share their names, types and defaults.
-"""
+"""Groups of constructor arguments as dataclasses, so that constructors share names, types and defaults."""
 
 from __future__ import annotations
 

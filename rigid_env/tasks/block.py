@@ -113,6 +113,8 @@ class BlockTask(Task):
 
     def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
         """Scene with the block at the middle of the area, above the floor, each parameter at the middle of its range.
+
+        `distributions` is not used: the block's parameters are known from the constructor.
         """
         size, centre = scene_size(self._parameters["size"]), self.area.centre
         values = {field: float(middle(each)) for field, each in self._parameters.items() if field != "size"}

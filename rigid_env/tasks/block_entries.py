@@ -1,5 +1,4 @@
-"""Entries of the observations of the block's tasks, with the names, units and bounds of the environments' docstrings.
-"""
+"""Entries of the observations of the block's tasks: names, units and bounds as in the environments' docstrings."""
 
 from __future__ import annotations
 

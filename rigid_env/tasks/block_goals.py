@@ -43,8 +43,7 @@ class BlockGoal(GoalTask, BlockTask):
         super().__init__(worlds, reward=reward, frame_skip=frame_skip, **settings)
 
     def shortfall(self, achieved, desired):
-        """Largest of three ratios, each of an error to its tolerance: error of the goal, of the speed, and of the spin.
-        """
+        """Largest of three ratios of an error to its tolerance: error of the goal, of the speed, and of the spin."""
         speed, spin = (np.abs(achieved[..., k] - desired[..., k]) for k in (-2, -1))
         miss = self.miss(achieved[..., :-2], desired[..., :-2])
         return np.maximum(miss, np.maximum(speed / REST_SPEED, spin / REST_SPIN))

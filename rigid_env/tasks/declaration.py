@@ -118,8 +118,7 @@ class Declaration:
         return {}
 
     def measure(self, worlds: Worlds) -> Mapping[str, np.ndarray]:
-        """Numbers (n,) by name: `info` holds them, and the other functions of the task read them as `worlds.measured`.
-        """
+        """Numbers (n,) by name: `info` holds them, and other functions of the task read them as `worlds.measured`."""
         return {}
 
     def goal_mark(self, world: int) -> Mapping[str, Any] | None:

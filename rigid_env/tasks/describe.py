@@ -284,7 +284,8 @@ def _default(value: Any) -> str:
 
 
 def _own_text(task: Task, name: str) -> tuple[str, ...]:
-    """First paragraph of the docstring of the task's function `name`, as a tuple; empty if the task does not define it.
+    """First paragraph, in a tuple, of the docstring of the task's function `name`; empty if the task does not define
+    it.
     """
     function = getattr(type(task), name)
     doc = function.__doc__ if function is not getattr(Declaration, name) else None

@@ -111,7 +111,6 @@ def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
 
 
 def is_of_user(distribution: Distribution) -> bool:
-    """True if the distribution, or one that it contains, is of a class from outside `rigid_env`, whose code may fail.
-    """
+    """True if the distribution, or one that it contains, has a class from outside `rigid_env`, whose code may fail."""
     parts = (distribution, *(part for part in vars(distribution).values() if isinstance(part, Distribution)))
     return any(not str(type(part).__module__).startswith("rigid_env.") for part in parts)

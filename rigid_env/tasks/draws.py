@@ -1,5 +1,4 @@
-"""Drawn values of episodes: each is drawn at the start, fixed by an option of `reset`, or held at a value by the user.
-"""
+"""Drawn values of episodes: drawn at the start, fixed by an option of `reset`, or held at a value by the user."""
 
 from __future__ import annotations
 
@@ -118,8 +117,7 @@ class Draws:
         return np.random.default_rng(SEED).random((1, self.uniforms))
 
     def _check(self, name: str, values, count: int) -> None:
-        """Raise a ValueError if the `count` values of a user's distribution are not finite numbers of the right shape.
-        """
+        """Raise a ValueError if the `count` values of a user's distribution are not finite or of a wrong shape."""
         length = self.distributions[name].length
         shape = (count,) if length == 1 else (count, length)
         what = f"at of {type(self.distributions[name]).__name__}, draws {name},"

@@ -153,8 +153,7 @@ class GoalTask(Task):
         return {"shortfall": self.shortfall(*self._both(rows))}
 
     def _check_goals(self, which: str, values: Any, rows: np.ndarray) -> None:
-        """Raise a ValueError if goals of worlds `rows` are not finite numbers of the right shape; `which` names them.
-        """
+        """Raise a ValueError if goals of worlds `rows` are not finite or of a wrong shape; `which` names them."""
         name, shape = type(self).__name__, (len(rows), self._goals.size)
         if not isinstance(values, np.ndarray) or values.shape != shape or values.dtype.kind not in "fiub":
             given = f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else shown(values)

@@ -158,7 +158,6 @@ def drawn(name: str, length: int = 1, unit: str = "1", scale: float = 1.0, bound
 
 
 def previous_action(size: int) -> Entry:
-    """Action of the control step before the last one, `size` numbers clipped to ±1; zeros at the start of an episode.
-    """
+    """Action of the control step before the last one: `size` numbers clipped to ±1; zeros at the start."""
     names = tuple(f"previous action {k}" for k in range(size))
     return Entry(names, "1", -1.0, 1.0, lambda worlds: worlds.previous_action)

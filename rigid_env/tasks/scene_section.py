@@ -1,5 +1,4 @@
-"""Keys of the table [environment] of a scene file, or arguments of the same names, with errors that tell file and line.
-"""
+"""Keys of the table [environment] of a scene file, or arguments of the same names; errors tell file and line."""
 
 from __future__ import annotations
 

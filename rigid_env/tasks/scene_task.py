@@ -108,8 +108,7 @@ class SceneTask(Task):
 
     @property
     def observation(self):
-        """Entries of the observation: position, velocity, rotation and angular velocity of every body, then the goal.
-        """
+        """Entries of the observation: position, velocity, rotation, angular velocity of every body, then the goal."""
         length, entries = self.settings.length, []
         for body in range(len(self.scene.bodies)):
             entries += [observe.pos(body, length), observe.linvel(body, length)]

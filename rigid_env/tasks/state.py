@@ -1,5 +1,4 @@
-"""State of a task: a copy of everything that decides the future of its worlds and episodes, and the file format for it.
-"""
+"""State of a task: a copy of everything that decides the future of its worlds and episodes, and its file format."""
 
 from __future__ import annotations
 

@@ -1,5 +1,4 @@
-"""Settings of a task that a state does not contain but that decide its future, so that they must agree to restore it.
-"""
+"""Settings of a task that decide its future but are not part of a state; they must agree where a state is restored."""
 
 from __future__ import annotations
 

@@ -316,8 +316,7 @@ class Task(Starts):
         self.clock += 1
 
     def _prepare(self) -> None:
-        """Make what belongs to this process: machine code bound to arrays, and the dict of arrays that a state copies.
-        """
+        """Make what belongs to this process: machine code bound to arrays, and the dict of arrays for states."""
         table, advance = self._table, self._advance
         self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
@@ -345,15 +344,14 @@ class Task(Starts):
         return state_settings(self)
 
     def own_settings(self) -> dict[str, Any]:
-        """Further settings that a state and the task that restores it must share, by name, for subclasses to override.
+        """Further settings that a state and the task that restores it must share, by name; subclasses override it.
 
         Scene, actions and time steps are compared anyway.
         """
         return {}
 
     def own_arrays(self) -> dict[str, np.ndarray]:
-        """Further arrays that a control step changes, by name, with a row for each world, for subclasses to override.
-        """
+        """Further arrays that a control step changes, by name, a row for each world; subclasses override it."""
         return {}
 
     def set_outcome(self, outcome: np.ndarray) -> None:

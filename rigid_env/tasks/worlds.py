@@ -126,7 +126,9 @@ class Worlds:
 
     @property
     def impact_impulse(self) -> np.ndarray:
-        """Sums (n, bodies, 3) float64 of the impulses of impacts on each body in the control step, world frame [N s].
+        """Sums (n, bodies, 3) float64 of the impulses of impacts on each body in the control step, world frame.
+
+        The unit is N s.
         """
         return self._impacts_of(0).total
 

@@ -40,8 +40,7 @@ def written_parts(documented: type) -> dict[str, Part]:
 
 
 def sentences(paragraphs: tuple[str, ...], is_kept: Callable[[str], bool]) -> tuple[str, ...]:
-    """Paragraphs with only those sentences for which `is_kept` returns True; paragraphs that become empty are left out.
-    """
+    """Paragraphs without the sentences for which `is_kept` returns False, and without paragraphs that become empty."""
     found = (" ".join(filter(is_kept, SENTENCE_END.split(text))) for text in paragraphs)
     return tuple(filter(None, found))
 
