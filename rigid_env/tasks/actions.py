@@ -35,8 +35,7 @@ class Vector(NamedTuple):
         Axes along which the action sets the vector, letters of "xyz"; the other components are 0.
     share : float
         Largest length: of a force over the weight m g, of a torque over m g times the body's reach, of an impulse over
-        m g
-        times 1 s.
+        m g times 1 s.
     frame : {"world", "body"}
         Frame of the axes.
     point : (3,) tuple or None
@@ -213,8 +212,9 @@ def check_body(body) -> None:
 
 
 def check_axes(field: str, axes) -> None:
-    """Raise a ValueError unless the text `axes` has one to three letters of "xyz", in this order; `field` names it in
-    the error.
+    """Raise a ValueError unless the text `axes` has one to three letters of "xyz", in this order.
+
+    `field` is the name of the argument in the error.
     """
     if not isinstance(axes, str) or not axes or axes != "".join(axis for axis in AXES if axis in axes):
         raise ValueError(f"{field} is {axes!r}; allowed are axes of 'xyz', in this order")
@@ -238,8 +238,7 @@ class ActionTable:
         Forces, torques and impulses that an action sets.
     table : (vectors, 6) int64
         A row for each vector: its kind, its body, the indices in the action of its x, y and z (-1: no number, always
-        0),
-        and 1 if the vector is in the body frame.
+        0), and 1 if the vector is in the body frame.
     points : (vectors, 3) float64
         Points at which the vectors act, body frame, from the centre of mass [m].
     has_impulses : bool

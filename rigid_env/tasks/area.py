@@ -21,8 +21,7 @@ class Area:
     """A square of the floor with the side 2 `half_width`, and the walls around it.
 
     In the layout ``three`` the square is centred at the origin between the walls x = ±half_width. In the layout
-    ``corner``
-    it extends from the walls x = 0 and z = 0 to x = z = 2 `half_width`. The floor is y = 0 in both.
+    ``corner`` it extends from the walls x = 0 and z = 0 to x = z = 2 `half_width`. The floor is y = 0 in both.
 
     Parameters
     ----------

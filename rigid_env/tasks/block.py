@@ -100,9 +100,7 @@ class BlockTask(Task):
         super().__init__(given.worlds, **part(given, ControlArguments))
 
     def declared_draws(self) -> Mapping[str, Any]:
-        """Distributions of an episode by name: place, yaw and face of the start, the goal, and five physical
-        parameters.
-        """
+        """Distributions of an episode: place, yaw and face of the start, the goal, and five physical parameters."""
         start = {"place": OnFloor(self.area), "yaw": YAW, "face": Face()}
         goal = {} if self.goal_draw is None else {self.goal_draw: self.goal()}
         return {**start, **goal, **self._parameters}

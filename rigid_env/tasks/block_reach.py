@@ -13,9 +13,7 @@ MARK_RADIUS = 1.0
 
 
 class BlockReach(BlockTask):
-    """Task of `rigid_env.envs.block_reach.BlockReachEnv` over a batch of worlds; the environment's docstring describes
-    it.
-    """
+    """Task of `rigid_env.envs.block_reach.BlockReachEnv`, whose docstring describes it, in a batch of worlds."""
 
     observation = (
         *entries.GOAL_OFFSET,

@@ -10,9 +10,7 @@ from rigid_env.tasks.block_draws import OtherFace
 
 
 class BlockReorient(BlockTask):
-    """Task of `rigid_env.envs.block_reorient.BlockReorientEnv` over a batch of worlds; the environment's docstring
-    describes it.
-    """
+    """Task of `rigid_env.envs.block_reorient.BlockReorientEnv`, whose docstring describes it, in a batch of worlds."""
 
     observation = (
         *entries.GOAL_AXES,

@@ -19,26 +19,21 @@ class Declaration:
 
     All functions get arrays with one row for each world. In each control step they are called once, in this order:
     `measure`, `update`, `success`, `failure`, `rewards`, then `read` of the observation's entries. At the start of
-    episodes
-    the order is `place`, `measure`, `begin`, then `read` of the entries; the arrays then have rows only for the worlds
-    in
-    which an episode begins.
+    episodes the order is `place`, `measure`, `begin`, then `read` of the entries; the arrays then have rows only for
+    the worlds in which an episode begins.
 
     Attributes
     ----------
     compiled : callable or None
         A kernel that replaces `measure`, `update`, `success`, `failure`, `rewards` and `read` of the entries, for
-        speed. It takes
-        ``(taken, state, record, walls, actions, obs, outcome)``, is decorated with `rigid_env.compiled.kernel`, and
-        runs
-        in the threads that step the worlds. None: the NumPy functions run.
+        speed. It takes ``(taken, state, record, walls, actions, obs, outcome)``, is decorated with
+        `rigid_env.compiled.kernel`, and runs in the threads that step the worlds. None: the NumPy functions run.
     measures, terms : tuple of str
         Only for a compiled task: names of the numbers, and of the terms of the reward, that the kernel writes into
         `outcome` after reward, success and failure.
     record_size : int
         Only for a compiled task: length of each world's row in `record`, the kernel's memory. `note_episodes` writes
-        drawn
-        values into it.
+        drawn values into it.
     """
 
     scene: ClassVar[physics.Scene]
@@ -56,15 +51,11 @@ class Declaration:
     record_size: ClassVar[int] = 0
 
     def declared_draws(self) -> Mapping[str, Any]:
-        """Distributions that each episode draws from, by name: `draws`, or distributions made from the constructor's
-        arguments.
-        """
+        """Distributions that each episode draws from, by name: `draws`, or those made from constructor arguments."""
         return self.draws
 
     def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
-        """Scene of all worlds: `scene`, or one made from the constructor's arguments; `distributions` has the task's
-        draws.
-        """
+        """Scene of all worlds: `scene`, or one made from constructor arguments and the task's `distributions`."""
         return self.scene
 
     def place(self, drawn: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
@@ -79,10 +70,8 @@ class Declaration:
         -------
         dict
             Arrays ``pos``, ``quat``, ``linvel`` and ``angvel`` of shape (n, bodies, 3|4|3|3). A scene with one body may
-            leave
-            out the axis of bodies; an array without the axis of episodes holds for all. The scene's values replace
-            missing
-            arrays.
+            leave out the axis of bodies; an array without the axis of episodes holds for all. The scene's values
+            replace missing arrays.
         """
         return {}
 
@@ -104,9 +93,7 @@ class Declaration:
         """Update `worlds.memory` from the state of the worlds; it is called after `measure` in each control step."""
 
     def success(self, worlds: Worlds) -> np.ndarray:
-        """Flags (n,) bool of worlds that have solved the task; an episode ends with it unless `ends_on_success` is
-        False.
-        """
+        """Flags (n,) bool of worlds that have solved the task, which ends the episode if `ends_on_success` is True."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def failure(self, worlds: Worlds) -> np.ndarray:

@@ -34,8 +34,7 @@ def check_class(task: type, base: type, declaration: type) -> None:
     ------
     TypeError
         Naming the attribute and what is allowed. Refused are an attribute that `Task` uses itself, a name that is
-        nearly
-        that of a declared attribute (a misspelling), and a function of the task that is not callable.
+        nearly that of a declared attribute (a misspelling), and a function of the task that is not callable.
     """
     declared = {name for name in vars(declaration) if not name.startswith("_")} | {"scene"}
     of_base = {name for each in base.__mro__ for name in vars(each) if not name.startswith("_")}
@@ -56,8 +55,7 @@ def check_class(task: type, base: type, declaration: type) -> None:
 
 
 def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
-    """Raise a ValueError if a key would be twice in `info`: among the environment's own keys, `names` and the keys of
-    `drawn`.
+    """Raise a ValueError if `info` would have a key twice: the environment's own keys, `names`, keys of `drawn`.
 
     `task` is the name of the task in the error.
     """
@@ -68,9 +66,7 @@ def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
 
 
 def checked_limit(value: Any, field: str) -> int | None:
-    """Largest number of control steps of an episode as an integer of at least 1, or None for no limit; `field` names
-    it.
-    """
+    """Most control steps of an episode: an integer of at least 1, or None for no limit; `field` names it in errors."""
     try:
         return None if value is None else validation.count(value, field)
     except ValueError as error:

@@ -1,5 +1,4 @@
-"""Write the documentation of any task as Markdown: the tables of an environment's docstring, from the task's
-declaration.
+"""Write the documentation of any task as Markdown: sections and tables, made from the task's declaration.
 
 The docstring of `rigid_env.envs.block_reach` is the model: sections with Gymnasium's titles, in Gymnasium's order.
 """
@@ -67,8 +66,9 @@ class Section:
 
 
 def describe(task: Task) -> str:
-    """Documentation of a task as Markdown. For an environment, `RigidEnv.describe` also documents the environment's
-    arguments.
+    """Documentation of a task as Markdown.
+
+    For an environment, `RigidEnv.describe` also documents the environment's arguments.
     """
     return markdown(sections(task))
 
@@ -91,8 +91,7 @@ def sections(
     task : Task
     documented : type, optional
         Class whose docstring describes the task; None: the task's class. If this docstring has sections with
-        Gymnasium's
-        titles, their paragraphs replace generated ones, and their meanings of arguments are used.
+        Gymnasium's titles, their paragraphs replace generated ones, and their meanings of arguments are used.
     added : mapping, optional
         Arguments that an environment adds to those of the task, with their defaults.
     registered : mapping, optional
@@ -284,9 +283,7 @@ def _default(value: Any) -> str:
 
 
 def _own_text(task: Task, name: str) -> tuple[str, ...]:
-    """First paragraph, in a tuple, of the docstring of the task's function `name`; empty if the task does not define
-    it.
-    """
+    """First paragraph of the docstring of the task's own function `name`, in a tuple; empty if there is none."""
     function = getattr(type(task), name)
     doc = function.__doc__ if function is not getattr(Declaration, name) else None
     return tuple(_paragraphs(inspect.cleandoc(doc))[:1]) if doc else ()

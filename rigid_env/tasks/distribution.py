@@ -44,8 +44,7 @@ class Distribution(ABC):
             Uniform numbers in [0, 1), a row for each value.
         drawn : mapping of str to array
             Values of the same episodes that are drawn earlier: physical parameters first, the rest in the order of the
-            task's
-            `draws`.
+            task's `draws`.
 
         Returns
         -------
@@ -90,8 +89,7 @@ class Distribution(ABC):
 
 
 def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
-    """Check that a user's value has finite numbers, and repeat it for each world: (worlds,) or (worlds, length)
-    float64.
+    """Check that a user's value has finite numbers, and repeat it for each world: (worlds,) or (worlds, length).
 
     `value` has `length` numbers for all worlds, or as many for each; a ValueError names `field`.
     """

@@ -38,8 +38,7 @@ class Push:
         Mean time between two pushes [s]; a control step has at most one.
     axes : str
         Axes that span the possible directions, letters of "xyz"; each direction has the same probability. ``xz`` means
-        all
-        horizontal directions.
+        all horizontal directions.
 
     Raises
     ------
@@ -106,9 +105,7 @@ def _take_size(kind: Push | Gust, field: str) -> None:
 
 
 def direction(shares: np.ndarray, axes: str) -> np.ndarray:
-    """Unit vector (3,), uniform over all directions in the span of `axes` (letters of "xyz"), from two uniform numbers
-    (2,).
-    """
+    """Unit vector (3,), uniform over directions in the span of `axes` (letters of "xyz"), from uniform numbers (2,)."""
     vector = np.zeros(3)
     places = ["xyz".index(axis) for axis in axes]
     if len(places) == 1:
@@ -201,8 +198,7 @@ class Disturbances:
         """Draw again when the next disturbances start, in all worlds.
 
         A planner's model calls it, so that it does not know the future of the real worlds. A disturbance starts in each
-        quiet
-        step with the same probability, so a wait that is drawn from now on has the right distribution.
+        quiet step with the same probability, so a wait that is drawn from now on has the right distribution.
         """
         for k, kind in enumerate(self.kinds):
             quiet = self._quiet(kind)
@@ -243,8 +239,7 @@ class Disturbances:
         return self.load, push
 
     def _draw(self, k: int, kind: Any, world: int, step: int) -> None:
-        """Start a disturbance in control step `step` of a world: draw its force, its end, and the start of the next
-        one.
+        """Start a disturbance in control step `step` of a world: draw its force, its end and the next start.
 
         `k` is the index of its `kind` among the task's disturbances.
         """

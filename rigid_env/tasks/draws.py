@@ -51,16 +51,14 @@ class Draws:
     ----------
     now : dict of str to (worlds,) or (worlds, k) float64
         Values of the running episodes. Before the first episode each value is the middle of its distribution; a value
-        of a
-        user's distribution, which may have no middle, is drawn with a fixed seed instead.
+        of a user's distribution, which may have no middle, is drawn with a fixed seed instead.
     uniforms : int
         Uniform numbers that an episode takes.
     held : dict of str to (worlds,) or (worlds, k) float64
         Values that new episodes take instead of draws, see `hold`.
     varying : set of str
         Physical parameters that are written into the world at the start of an episode; all others have the scene's
-        values
-        in every episode.
+        values in every episode.
     """
 
     def __init__(self, distributions: Mapping[str, Distribution], worlds: int):
@@ -153,8 +151,7 @@ class Draws:
             self.varying.add(name)
 
     def read(self, name: str, field: str, value, worlds: int) -> np.ndarray:
-        """Check a user's value for the draw `name` as `Distribution.read` does, and that a physical parameter is in its
-        range.
+        """Check a user's value for the draw `name`: shape, finite numbers, and the range of a physical parameter.
 
         `field` is the name of the value in an error.
         """
@@ -250,8 +247,7 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
     """Check the draw `name`, a size or radius, against the shapes of the bodies that it means.
 
     A ValueError refuses a radius for a body that is no sphere, a radius beside a size for the same body, and a size
-    with
-    three independent numbers for a sphere.
+    with three independent numbers for a sphere.
     """
     kind, body = parameter_of(name) or ("", None)
     bodies = world.scene.bodies

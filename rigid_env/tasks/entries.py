@@ -24,8 +24,7 @@ class Entry:
         Bounds, in units of `scale` times `unit`; numbers outside are clipped to them.
     read : callable, optional
         Function from `Worlds` to the numbers, (n,) or (n, numbers), in `unit`. None: the task has a compiled function
-        that
-        writes the observation.
+        that writes the observation.
     scale : float
         Number that the observation is divided by: with 5 and ``m`` an observation of 1 means 5 m.
 
@@ -127,8 +126,7 @@ class Observation:
         self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []
 
     def read(self, worlds, out: np.ndarray) -> np.ndarray:
-        """Read the numbers of all entries from `worlds`, and write them scaled and clipped into `out` (n, size)
-        float32.
+        """Read the numbers of all entries from `worlds`; write them scaled and clipped into `out` (n, size) float32.
 
         Returns
         -------
@@ -160,8 +158,7 @@ class Observation:
         """Make a table (count, size) for the numbers of all entries.
 
         Returns the table, and for each entry the view of it that the entry's numbers go into, as (n, numbers) and, if
-        it has
-        one number, as (n,).
+        it has one number, as (n,).
         """
         table = np.empty((count, self.size))
         return table, [

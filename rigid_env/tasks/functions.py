@@ -17,12 +17,10 @@ from rigid_env.tasks.worlds import Worlds
 
 
 class Functions:
-    """Caller of the NumPy functions of a task that is not compiled; it checks their results and stores them in the
-    task.
+    """Caller of the NumPy functions of a task that is not compiled; it checks and stores their results.
 
     The constructor calls each function once for world 0, with drawn values. This rehearsal finds a mistake before the
-    first
-    episode.
+    first episode.
 
     Parameters
     ----------
@@ -55,9 +53,7 @@ class Functions:
         self.undo = StepUndo(task)
 
     def _rehearse(self) -> None:
-        """Call each function once in world 0, with values drawn for it, and restore the world; errors mention the
-        rehearsal.
-        """
+        """Call each function once in world 0, with drawn values, and restore the world; errors mention it."""
         task = self.task
         world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
         values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
@@ -102,9 +98,7 @@ class Functions:
             raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
 
     def begin(self, rows: np.ndarray) -> None:
-        """Write the first observation and the first measures of the episodes that begin in worlds `rows` (n,) into the
-        task.
-        """
+        """Write the first observations and measures of the episodes that begin in worlds `rows` (n,) into the task."""
         task = self.task
         worlds = Worlds(task, rows)
         self._measure(worlds)
@@ -144,9 +138,7 @@ class Functions:
         task.outcome[...], task.obs[...] = outcome, self._obs
 
     def _look(self, worlds: Worlds) -> Mapping:
-        """Call `measure`, `update`, `success`, `failure` and `rewards` in this order; return the terms of the reward by
-        name.
-        """
+        """Call `measure`, `update`, `success`, `failure`, `rewards` in this order; return the terms of the reward."""
         task = self.task
         self._measure(worlds)
         task.update(worlds)
@@ -158,9 +150,7 @@ class Functions:
         worlds.measured = Named(self._numbers("measure", self.task.measure(worlds), len(worlds)), "measured")
 
     def _numbers(self, function: str, values, count: int) -> dict:
-        """Return the result `values` of a function if it is a dict of numbers, each (count,) or one for all; else raise
-        ValueError.
-        """
+        """Check that a function's result is a dict of numbers, each (count,) or one for all; return it."""
         if type(values) is not dict:
             raise ValueError(f"{function} of {self._name} gave {values!r}; allowed is a dict of arrays by name")
         shape = (count,)
@@ -182,9 +172,7 @@ class Functions:
         return values
 
     def _fill(self, function: str, values: Mapping, names: tuple[str, ...], out: np.ndarray, first: int) -> None:
-        """Write the numbers of a function's result into the columns of `out` from `first` on; refuse other names than
-        `names`.
-        """
+        """Write the numbers of a function's result into columns of `out` from `first` on; other names are refused."""
         if tuple(values) != names:
             raise ValueError(
                 f"{function} of {self._name} gave the names {', '.join(map(repr, values))}; allowed are those of its "

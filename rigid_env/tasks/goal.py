@@ -20,8 +20,7 @@ class GoalTask(Task):
     """Goal-conditioned task: reward and success depend only on the desired and the achieved goal, two rows of numbers.
 
     So an algorithm can compute the reward for another desired goal, as hindsight experience replay does. Success does
-    not
-    end an episode, since the goal is to be kept.
+    not end an episode, since the goal is to be kept.
 
     A subclass declares `goal_entries`, and defines `desired` and `shortfall`.
 
@@ -118,8 +117,7 @@ class GoalTask(Task):
         return (self._shortfall(achieved_goal, desired_goal) <= 1.0) & self.ends_on_success
 
     def compute_truncated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Return False for every pair of goals, (...,) bool: only the limit of steps truncates an episode, never a
-        goal.
+        """Return False for every pair of goals, (...,) bool: only the limit of steps truncates an episode.
 
         Arguments and errors as of `compute_reward`.
         """

@@ -244,10 +244,8 @@ def observe_reorient(taken, state, record, walls, actions, obs, outcome):
     """Write observation, reward and success of the task BlockReorient for some worlds.
 
     Arguments as of `observe_reach`, with obs (worlds, 23) float32. The observation has the body axes in the order of
-    the
-    goal: first the outward normal of the target face, then the next two body axes in cyclic order. The half edges have
-    the
-    same order. So the policy need not know which face is the target.
+    the goal: first the outward normal of the target face, then the next two body axes in cyclic order. The half edges
+    have the same order. So the policy need not know which face is the target.
     """
     for i in range(taken[TAKEN_COUNT]):
         world = taken[TAKEN_FIRST_WORLD + i]

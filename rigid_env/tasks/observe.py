@@ -72,9 +72,7 @@ def offset(of: int, to: int, scale: float = LENGTH, bound: float = REACH) -> Ent
 
 
 def wall_gaps(body: int = 0, walls: int = 3, scale: float = LENGTH, bound: float = REACH) -> Entry:
-    """Gaps between a body and each of the first `walls` walls of the scene [m]; negative where the body overlaps a
-    wall.
-    """
+    """Gaps between a body and each of the scene's first `walls` walls [m]; negative where it overlaps a wall."""
     names = _names("gap", body, [f"to wall {k}" for k in range(walls)])
     return Entry(names, "m", -1.0, bound, lambda worlds: worlds.wall_gaps[:, body, :walls], scale)
 
@@ -87,8 +85,9 @@ def contact_force(body: int = 0, bound: float = REACH) -> Entry:
 
 
 def contact_impulse(body: int = 0, scale: float = IMPULSE, bound: float = REACH) -> Entry:
-    """Sum of the contact impulses on a body over its weight [s], in the last resting stage: the final part of a physics
-    step.
+    """Sum of the contact impulses on a body over its weight [s], in the last resting stage.
+
+    A resting stage is the final part of a physics step.
 
     See `physics.Contacts` for stages. Impulses of impacts are not included; `impact_impulse` has them.
     """
@@ -105,8 +104,7 @@ def impact_impulse(body: int = 0, scale: float = IMPACT, bound: float = REACH) -
 
 
 def contact_points(body: int = 0, count: int = 4, scale: float = LENGTH, bound: float = REACH) -> Entry:
-    """Points of the `count` contacts of a body with the largest forces, relative to its centre of mass: x, y, z each
-    [m].
+    """Points of the `count` contacts of a body with the largest forces, from its centre of mass: x, y, z each [m].
 
     With fewer contacts, the remaining numbers are 0.
     """
@@ -115,18 +113,14 @@ def contact_points(body: int = 0, count: int = 4, scale: float = LENGTH, bound: 
 
 
 def contact_forces(body: int = 0, count: int = 4, bound: float = REACH) -> Entry:
-    """Forces on a body at its `count` contacts with the largest forces, over its weight, in the order of
-    `contact_points`.
-    """
+    """Forces on a body at its `count` strongest contacts, over its weight, in the order of `contact_points`."""
     names = _contact_names("force", body, count)
     read = lambda worlds: _rows(worlds.contacts_of(body, count).force) / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g", -bound, bound, read)
 
 
 def impact_impulses(body: int = 0, count: int = 2, scale: float = IMPACT, bound: float = REACH) -> Entry:
-    """Impulses of a body's impacts over its weight [s]: one vector for each wall or body that it hit, the `count`
-    largest.
-    """
+    """Impulses of a body's impacts over its weight [s]: a vector for each wall or body hit, the `count` largest."""
     names = _contact_names("impulse", body, count, "impact")
     read = lambda worlds: _rows(worlds.impacts_of(body, count).impulse) / worlds.weight[:, body, None]  # noqa: E731
     return Entry(names, "m g s", -bound, bound, read, scale)

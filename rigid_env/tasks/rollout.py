@@ -53,9 +53,7 @@ class TaskRollout:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """Length (worlds,) int64 of each episode: control steps up to and including the one that ends it; all if none
-        does.
-        """
+        """Length (worlds,) int64 of each episode: control steps up to its end, inclusive; all if it does not end."""
         ends = self.failure | self.success if self.ends_on_success else self.failure
         return np.where(ends.any(axis=1), ends.argmax(axis=1) + 1, ends.shape[1])
 
@@ -100,9 +98,8 @@ def rollout(
     """Step every world of a task with its own sequence of actions, and keep the rewards.
 
     A rollout has the same bits as `Task.step` with one action after another. No episode restarts. The arrays also
-    contain
-    the steps after the end of an episode, which `TaskRollout.returns` leaves out. Afterwards the task is in the state
-    after the last step.
+    contain the steps after the end of an episode, which `TaskRollout.returns` leaves out. Afterwards the task is in the
+    state after the last step.
 
     Parameters
     ----------
@@ -112,10 +109,8 @@ def rollout(
         Clipped to ±1.
     initial : TaskState, optional
         State that the worlds begin from (``env.unwrapped.get_state()``): of one world, which all worlds then begin
-        from,
-        or of as many worlds. None: the present state of the task. The state's random generators decide the
-        disturbances,
-        so these are the ones that the environment will meet.
+        from, or of as many worlds. None: the present state of the task. The state's random generators decide the
+        disturbances, so these are the ones that the environment will meet.
     observations : bool
         Keep observations, too.
     every : int
@@ -171,8 +166,7 @@ def _actions(task: Task, actions: ArrayLike) -> np.ndarray:
 
 
 def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kept:
-    """Return arrays for the results: those of `out`, or new ones; a ValueError if they need more than this machine's
-    memory.
+    """Return arrays for the results: those of `out`, or new ones; refuse more than this machine's memory.
 
     `samples` is the number of observations that are kept for each world.
     """
@@ -209,9 +203,7 @@ def _needs_python(task: Task) -> bool:
 
 
 def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
-    """Take all control steps with one Python call each, and write `kept`; return the gravest status (worlds,) of each
-    world.
-    """
+    """Take all control steps from Python, and write `kept`; return the gravest status (worlds,) of each world."""
     gravity = np.array([Status.severity(status) for status in Status])
     status = np.full(task.worlds, Status.OK, dtype=np.int64)
     for k in range(actions.shape[1]):

@@ -34,9 +34,7 @@ class Section:
         return key in self.values
 
     def error(self, key: str | None, message: str) -> ValueError:
-        """Make an error with a message about a key, or about the table itself if the key is None; it tells file and
-        line.
-        """
+        """Make an error with a message about a key (None: about the table itself); it tells file and line."""
         if self._places is not None:
             return self._places.error_in_table(self.name, key, message)
         return ValueError(f"{self.name}: {message}" if self.name else message)
@@ -73,9 +71,7 @@ class Section:
 
 
 def body_indices(value, field: str, scene: physics.Scene) -> tuple[int, ...]:
-    """Indices of bodies, each once, from a list of names and indices, or from a single one; `field` names it in an
-    error.
-    """
+    """Indices of bodies, each once, from names and indices or a single one; `field` names the value in an error."""
     given = list(value) if isinstance(value, (list, tuple)) else [value]
     if not given:
         raise ValueError(f"{field} is {shown(value)}; allowed is at least one body")

@@ -83,9 +83,7 @@ class Starts(Declaration):
         def distributions(self) -> dict[str, Distribution]: ...
 
     def seed(self, world: int, seed: int | None) -> int:
-        """Give one world a new random generator, seeded as `gymnasium.Env.reset` does; returns the seed (random for
-        None).
-        """
+        """Give one world a new random generator, as `gymnasium.Env.reset` does; returns its seed (None: random)."""
         self.generators[world], used = seeding.np_random(seed)
         return used
 
@@ -98,8 +96,7 @@ class Starts(Declaration):
             Worlds.
         options : dict, optional
             Values that are otherwise drawn, by the names of the task's `draws`; each has one value for all `rows`, or
-            one for
-            each row.
+            one for each row.
 
         Raises
         ------
@@ -195,9 +192,7 @@ class Starts(Declaration):
         return found
 
     def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Arguments of `World.set_state` for new episodes: the scene's poses and velocities, or those that `place`
-        returns.
-        """
+        """Arguments of `World.set_state` for new episodes: the scene's poses and velocities, or those of `place`."""
         given = self.place(values)
         if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
             raise ValueError(
@@ -254,9 +249,7 @@ class Starts(Declaration):
         self._note_parameters(np.arange(self.worlds))
 
     def _change(self, name: str, value: np.ndarray) -> None:
-        """Set a physical parameter in all worlds to values (worlds,) or (worlds, k); after an error nothing has
-        changed.
-        """
+        """Set a physical parameter in all worlds to values (worlds,) or (worlds, k); an error changes nothing."""
         try:
             arguments: Any = self._arguments(np.arange(self.worlds), {name: value})
             self.world.set_parameters(**arguments)

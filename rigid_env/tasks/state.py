@@ -26,8 +26,7 @@ FILE = FileKind(
 
 @dataclass(frozen=True)
 class TaskState:
-    """Copy of everything that decides the future of a task's worlds, with the settings that a task must share to
-    restore it.
+    """Copy of everything that decides the future of a task's worlds, with the settings that restoring requires.
 
     Accuracy, `max_episode_steps` and the distributions of draws may differ: the worlds then continue with those of the
     task that restores the state.
@@ -43,8 +42,7 @@ class TaskState:
         Poses, velocities, parameters, warm starts, actuators and time of the worlds.
     arrays : dict of str to array
         Arrays with a row for each world: drawn values, memory, actions, potential and hold of compiled tasks,
-        disturbances,
-        observations and outcomes of the last step.
+        disturbances, observations and outcomes of the last step.
     held : dict of str to array
         Values that `Task.hold` holds, with a row for each world.
     told : tuple of str

@@ -51,8 +51,7 @@ class Steps:
         self.advance_disturbed(None, None)
 
     def advance_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
-        """Take all physics steps under a disturbing load, and the first one also under a push; neither goes through
-        actuators.
+        """Take all physics steps under a load, and the first one also under a push, both past the actuators.
 
         Parameters
         ----------

@@ -48,13 +48,11 @@ class _Arguments(ControlArguments, BatchArguments):
 
 
 class Task(Starts):
-    """A batch of worlds of one scene, with a task of reinforcement learning in them. Subclass it to write your own
-    task.
+    """A batch of worlds of one scene, with a task of reinforcement learning in them; subclass it to write your own.
 
     A subclass declares the attributes below. Of the functions `place`, `begin`, `update`, `success`, `failure`,
-    `rewards`
-    and `measure` it defines those that it needs. These are NumPy functions of `Worlds`, arrays with one row for each
-    world, and are called once in a control step. docs/tasks.md builds a task from nothing.
+    `rewards` and `measure` it defines those that it needs. These are NumPy functions of `Worlds`, arrays with one row
+    for each world, and are called once in a control step. docs/tasks.md builds a task from nothing.
 
     Parameters
     ----------
@@ -87,12 +85,11 @@ class Task(Starts):
         Declared: `rigid_env.observe` has the usual entries.
     draws : mapping of str to Distribution, number or pair
         Declared: values that each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``,
-        ``restitution``
-        and ``gravity`` are written into the world (``mass[1]``: of body 1 alone); the task's functions use the others.
+        ``restitution`` and ``gravity`` are written into the world (``mass[1]``: of body 1 alone); the task's functions
+        use the others.
     memory : mapping of str to int
         Declared: names of the numbers that functions keep from step to step, each with its count per world. They are
-        zero
-        at the start of an episode.
+        zero at the start of an episode.
     disturbances : sequence of Push and Gust
         Declared: impulses and forces on bodies at random times.
     max_episode_steps : int or None
@@ -333,9 +330,7 @@ class Task(Starts):
         }  # fmt: skip
 
     def state_arrays(self) -> dict[str, np.ndarray]:
-        """Arrays of the task that decide the future of episodes, by name, with a row for each world; the world's own
-        are not here.
-        """
+        """Arrays of the task, without those of the world, that decide the future of episodes; a row per world."""
         return {**self.kept_arrays, "steps": self.steps}
 
     @cached_property

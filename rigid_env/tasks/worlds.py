@@ -24,8 +24,7 @@ class Worlds:
     """Worlds that a task's functions read: all worlds in a control step, or those in which an episode begins.
 
     Arrays for all worlds are views of the running simulation: copy them to keep them. Quantities that take long to
-    compute
-    are computed when they are first read, once in a step.
+    compute are computed when they are first read, once in a step.
 
     Attributes
     ----------
@@ -100,8 +99,9 @@ class Worlds:
 
     @property
     def contact_impulse(self) -> np.ndarray:
-        """Sums (n, bodies, 3) float64 of the contact impulses on each body in the last resting stage, world frame [N
-        s].
+        """Sums (n, bodies, 3) float64 of the contact impulses on each body in the last resting stage [N s].
+
+        World frame.
         """
         return self._contact_sums()[1]
 
@@ -116,7 +116,7 @@ class Worlds:
         return self._contacts_of()
 
     def contacts_of(self, body: int, count: int) -> Contacts:
-        """Contacts of one body, the `count` with the largest forces; in each row that body is the first of the two."""
+        """Contacts of one body, the `count` with the largest forces; this body is the first of each pair."""
         return self._contacts_of(count, body)
 
     def _contacts_of(self, *chosen: int) -> Contacts:
@@ -134,15 +134,11 @@ class Worlds:
 
     @property
     def impacts(self) -> Impacts:
-        """Impacts of the last control step, with a row for each pair of body and wall or of two bodies; see
-        `physics.Impacts`.
-        """
+        """Impacts of the last control step, a row for each pair that collided; see `physics.Impacts`."""
         return self._impacts_of()
 
     def impacts_of(self, body: int, count: int) -> Impacts:
-        """Impacts of one body, the `count` pairs with the largest impulses; in each row that body is the first of the
-        two.
-        """
+        """Impacts of one body, the `count` pairs with the largest impulses; this body is the first of each pair."""
         return self._impacts_of(count, body)
 
     def _impacts_of(self, *chosen: int) -> Impacts:

@@ -59,8 +59,7 @@ def write_wrench(i, actions, table, points, limits, state, wrench, kick):
 
 @entry_kernel
 def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
-    """Convert actions to wrenches: clip each number to ±1, shorten each vector to length 1, and multiply it by its
-    limit.
+    """Convert actions to wrenches: clip numbers to ±1, shorten each vector to length 1, multiply it by its limit.
 
     Parameters
     ----------
@@ -76,8 +75,7 @@ def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
         State of the bodies, whose attitudes turn vectors from body frames.
     wrench, kick : (worlds, bodies, 6) float64, out
         World frame: wrenches of forces and torques, and wrenches of impulses, which are given as forces. The same array
-        if
-        there are no impulses.
+        if there are no impulses.
 
     Returns
     -------

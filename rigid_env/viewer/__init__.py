@@ -1,5 +1,4 @@
-"""Viewer in the browser: plays worlds, environments, recordings and trajectories, and lets the user act; extra
-``view``.
+"""Viewer in the browser: plays worlds, environments, recordings and trajectories; it needs the extra ``view``.
 
 - Subjects, things that can be played: `subject` makes one of the classes in `worlds`, `episodes` and `replays`, which
   share the base class in `interface`; `copies` and `listening` help them.

@@ -24,8 +24,7 @@ COILS, COIL_POINTS, COIL_RADIUS = 9, 12, 0.03
 
 
 class Nodes:
-    """Base of objects that own nodes of viser's scene: the first drawing adds the nodes, and `hide` makes them
-    invisible.
+    """Base of objects that own nodes of viser's scene, which are added by the first drawing and can be hidden.
 
     Parameters
     ----------
@@ -68,8 +67,7 @@ class Arrows(Nodes):
         self.unit = placement.unit
 
     def draw(self, starts, vectors, colours) -> None:
-        """Draw arrows from points `starts` (n, 3), world frame [m], along `vectors` (n, 3) that have the arrows'
-        lengths [m].
+        """Draw arrows from points `starts` (n, 3) along `vectors` (n, 3), as long as the vectors; world frame [m].
 
         `colours` is one RGB colour for all, or (n, 3).
         """

@@ -145,8 +145,7 @@ class Controls:
         return self.subject.accuracy
 
     def set_accuracy(self, preset: str) -> None:
-        """Continue with another preset from the same state; a preset that must be compiled takes effect when that is
-        done.
+        """Continue with another preset from the same state, as soon as its kernel is compiled.
 
         Raises
         ------

@@ -30,8 +30,7 @@ def declared(scene: physics.Scene) -> physics.Scene:
     """Scene with gravity, friction and restitution among its effects, so that sliders can change each of them.
 
     Added effects have the value 0. Friction and restitution belong to contact: a scene without `Contact` does not get
-    them,
-    and contact with a stiffness gets no restitution.
+    them, and contact with a stiffness gets no restitution.
     """
     effects = list(scene.effects)
     if scene.effect(Gravity) is None:

@@ -206,9 +206,7 @@ def take_chain(env: gym.Env) -> Chain:
 
 
 def put_chain(env: gym.Env, chain: Chain, is_other: bool = False) -> None:
-    """Restore an environment and its wrappers from a result of `take_chain`; `is_other`: it was taken at another
-    accuracy.
-    """
+    """Restore an environment and its wrappers from `take_chain`; `is_other`: taken at another accuracy."""
     state, remembered = chain
     if is_other:
         state = replace(state, world=fitted(state.world, env.unwrapped.task.world))

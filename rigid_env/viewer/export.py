@@ -42,8 +42,7 @@ def page_of(
     """Make an HTML page of a motion, which plays in a browser without a network.
 
     Poses are float32, as everywhere in viser, and are not interpolated. The page has viser's client (about 0.8 MB), and
-    for
-    each picture 28 bytes per moving body, before compression.
+    for each picture 28 bytes per moving body, before compression.
 
     Parameters
     ----------

@@ -27,11 +27,9 @@ class Ghost:
     """World at the accuracy `REFERENCE` that takes the same steps as another world, to show the error of that world.
 
     Event-driven schemes follow the true motion nearly to rounding. Other schemes, used where bodies touch each other or
-    are
-    tied together, bound only the error of each step, so the ghost's error after many steps is unknown. A second world
-    with
-    tolerances ten times as large then takes the same steps, as in `physics.work_precision.truth.ReferenceTruth`. The
-    distance between the two estimates the ghost's own error.
+    are tied together, bound only the error of each step, so the ghost's error after many steps is unknown. A second
+    world with tolerances ten times as large then takes the same steps, as in
+    `physics.work_precision.truth.ReferenceTruth`. The distance between the two estimates the ghost's own error.
 
     Parameters
     ----------
@@ -94,16 +92,12 @@ class Ghost:
                 _take(self._looser, call)
 
     def distance(self, world: physics.World) -> tuple[float, float]:
-        """Largest distance between a body's centre of mass and the ghost's [m], and largest angle between their
-        attitudes [rad].
-        """
+        """Largest distance of a centre of mass from the ghost's [m], and largest angle between attitudes [rad]."""
         return distance(world, self.world)
 
     @property
     def own_error(self) -> float:
-        """Error of the ghost itself: largest distance of a centre of mass from the second world [m]; NaN if it is no
-        estimate.
-        """
+        """Error of the ghost: largest distance of a centre of mass from the second world [m]; NaN if not estimated."""
         return math.nan if self._looser is None else distance(self._looser, self.world)[0]
 
     @property
@@ -137,8 +131,6 @@ def _looser(acting: physics.Accuracy) -> physics.Accuracy:
 
 
 def distance(one: physics.World, other: physics.World) -> tuple[float, float]:
-    """Largest distance between two worlds' centres of mass [m], and largest angle between their bodies' attitudes
-    [rad].
-    """
+    """Largest distance between centres of mass in two worlds [m], and largest angle between attitudes [rad]."""
     apart = np.linalg.norm(one.pos[0] - other.pos[0], axis=-1)
     return float(apart.max()), float(angles_between(one.quat[0], other.quat[0]).max())

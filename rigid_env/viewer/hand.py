@@ -61,9 +61,7 @@ class Hand:
         return world.pos[0, self.body] + arm, self.target.copy()
 
     def load(self, world: physics.World, interval: float) -> np.ndarray | None:
-        """Wrench (bodies, 6) on each body in a step of `interval` [s]: force [N] and torque [N m], world frame; None if
-        zero.
-        """
+        """Wrench (bodies, 6) of the hand in a step of `interval` [s]: force [N], torque [N m], world frame; or None."""
         if self.body is None and not self.kicks:
             return None
         load = np.zeros((world.body_count, 6))
@@ -138,9 +136,7 @@ class HandOfUser:
             self.inner.begin(rows)
 
     def act(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Return the load (1, bodies, 6) of the coming control step, and the extra load of its first physics step;
-        None: no load.
-        """
+        """Load (1, bodies, 6) of the coming control step, and a further one of its first physics step; or None."""
         load, push = (None, None) if self.inner is None else self.inner.act()
         if self.pull is None:
             return load, push

@@ -131,8 +131,9 @@ class Subject:
         return False
 
     def restart(self, seed: int) -> None:
-        """Return to the start, with a new seed if the subject uses one. The accuracy stays; sliders return to their
-        first values.
+        """Return to the start, with a new seed if the subject uses one.
+
+        The accuracy stays; sliders return to their first values.
         """
         raise NotImplementedError
 
@@ -178,13 +179,9 @@ class Subject:
         return []
 
     def settings(self) -> dict[str, float]:
-        """Present values of the sliders that the subject allows: gravity [m/s²], and friction and restitution of body
-        0.
-        """
+        """Present values of the sliders that the subject allows: gravity [m/s²], friction and restitution of body 0."""
         return {}
 
     def rehearsal(self) -> Callable[[], None] | None:
-        """Function without arguments that compiles what a step needs and may run in another thread; None: nothing to
-        compile.
-        """
+        """Function that compiles what a step needs, and may run in another thread; None: nothing to compile."""
         return None

@@ -234,9 +234,7 @@ class Fields(Nodes):
         return middle
 
     def _add(self, mark: Mark):
-        """Add the part of a mark that does not move to viser's scene; returns its node, or None if there is no such
-        part.
-        """
+        """Add a node for the part of a mark that does not move to viser's scene; None if there is no such part."""
         name = f"{self._name}/{self._marks.index(mark)}"
         if mark.direction is not None:
             return self._scene.add_label(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 CALL_WEIGHT, STEP_WEIGHT = 0.1, 0.05
-"""Weights of the newest call in the mean pace and of the newest step in the mean cost; older ones fade exponentially.
-"""
+"""Weights of the newest call in the mean pace and of the newest step in the mean cost; older ones fade."""
 
 TOLD = 0.9
 """Share of the requested speed below which the user is told that the run cannot keep up."""

@@ -81,9 +81,7 @@ class Panel:
         self._events.show(session.events)
 
     def _put(self, handle, name: str, value) -> None:
-        """Set property `name` of a control if the session's value has changed; a value that the user has just set
-        stays.
-        """
+        """Set property `name` of a control if the session has changed its value; the user's latest input stays."""
         key = id(handle), name
         if self._told.get(key) == value or any(handle is each for each in self._pending):
             return

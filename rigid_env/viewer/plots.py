@@ -101,8 +101,7 @@ def drawn(plot: Plot, samples: Samples, every: np.ndarray) -> tuple[tuple[str, .
     """Columns of a plot that have enough finite samples, and its data: times [s] and a line of values for each column.
 
     `every` has the indices of the samples to draw. Times start where the first column is finite, since a line that
-    begins
-    with NaN hides the whole plot on a linear axis.
+    begins with NaN hides the whole plot on a linear axis.
     """
     lines = {name: line(getattr(samples, name)[every], plot) for name in plot.columns}
     known = {name: np.isfinite(values) for name, values in lines.items()}

@@ -41,9 +41,7 @@ class PlayedRecording(WorldSubject):
 
     @property
     def time(self) -> float:
-        """Time of the first state plus the lengths of all steps since [s]; a reset within the recording does not set it
-        back.
-        """
+        """Time of the first state plus all steps since [s]; a reset within the recording does not set it back."""
         return float(self._times[self._call])
 
     @property

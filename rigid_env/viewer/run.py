@@ -100,9 +100,7 @@ class Run:
         self._sample()
 
     def _step(self, record: Any = None) -> Any:
-        """Take one step of the subject with the user's forces; `record` repeats an earlier step. Returns the step's
-        record.
-        """
+        """Take one step of the subject with the user's forces, a new one or that of a `record`; returns its record."""
         world = self.subject.world
         load = None if world is None else self.hand.load(world, self.subject.interval)
         record = self.subject.step(load, record)
@@ -210,9 +208,7 @@ class Run:
             self._apply(given)
 
     def _put_ghost(self, kept: Any, steps: int) -> bool:
-        """Restore the ghost's kept state, unless following the run for `steps` steps takes too long; returns whether it
-        did.
-        """
+        """Restore the ghost's kept state, unless `steps` steps of the ghost take too long; returns whether it did."""
         if self.ghost is None or kept is None:
             return False
         cost = self.ghost.cost.value * self.subject.interval / MICROSECONDS  # computing time of a step [s]

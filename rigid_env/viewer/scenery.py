@@ -13,8 +13,7 @@ from rigid_env.rendering.layout import FADE_LENGTH, Room, default_camera, is_flo
 from rigid_env.viewer.interface import Look
 
 SIGHT = 12.0
-"""First distance of the camera from its target [drawn units]; shadows of viser reach 20 units in a scene of any size.
-"""
+"""First distance of the camera from its target [drawn units]; viser's shadows reach 20 units in any scene."""
 
 WINDOW = (1000, 640)
 """[px] Window in which the whole room is visible at first."""
@@ -117,8 +116,7 @@ def light(scene) -> None:
     """Light viser's scene as `rendering.palette` does: from the sun and the sky, with shadows on floors.
 
     A weak spotlight casts the shadows. Shadows of a directional light would take three maps of the scene, each as large
-    as
-    the spotlight's, and without a GPU a picture would take ten times as long.
+    as the spotlight's, and without a GPU a picture would take ten times as long.
     """
     scene.configure_default_lights(enabled=False)
     scene.configure_environment_map(None)

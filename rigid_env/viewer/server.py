@@ -80,9 +80,7 @@ class Viewer:
             self.close()
 
     def turn(self, seconds: float) -> bool:
-        """Carry out the user's inputs, advance by `seconds` of real time, and draw; returns True if anything has
-        changed.
-        """
+        """Carry out the user's inputs, advance by `seconds` of real time, and draw; True if anything has changed."""
         is_new = self._answer()
         is_new = self._session.advance(seconds) > 0 or is_new
         look_time = self._session.time

@@ -20,8 +20,7 @@ class Session(Controls):
 
     Kernels compile in the background, while `is_compiling` is True. Until the kernel for the start is compiled, the run
     stays at its start. Until another kernel is compiled, the run continues without it. An error of the simulation
-    pauses
-    the run, and its text is in `message`.
+    pauses the run, and its text is in `message`.
 
     Parameters
     ----------
@@ -134,8 +133,7 @@ class Session(Controls):
         """Go to the latest known moment that is not after `time` [s], bit for bit.
 
         A subject with a known end also takes new steps up to `time`. At an earlier moment, later ones stay known until
-        a step or
-        an input there replaces them.
+        a step or an input there replaces them.
         """
         time = validation.number(time, "time")
         self._poll()

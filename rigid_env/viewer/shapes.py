@@ -133,8 +133,7 @@ def world_point(body: BodyView, point_body) -> np.ndarray:
 
 
 def hit(body: BodyView, origin, direction) -> np.ndarray | None:
-    """Point (3,) where a ray enters a body, world frame [m]; where it leaves the body if it starts inside; None if it
-    misses.
+    """Point (3,) where a ray enters a body, or leaves it if it starts inside; world frame [m]. None if it misses.
 
     Parameters
     ----------

@@ -108,8 +108,7 @@ class Stage:
         callback : callable
             ``(phase, body, point_body, target)``: "start", "update" or "end"; index of the body; the point that was
             grabbed, in the body's frame from `BodyView.pos` [m]; the place of the mouse at the depth of that point,
-            world frame
-            [m]. It is called in the server's thread: keep it short.
+            world frame [m]. It is called in the server's thread: keep it short.
         """
         self._on_drag = callback
 
@@ -120,8 +119,7 @@ class Stage:
         ----------
         callback : callable
             ``(body, point, direction)``: index of the body; the clicked point of its surface, world frame [m]; unit
-            vector of
-            the line of sight. It is called in the server's thread: keep it short.
+            vector of the line of sight. It is called in the server's thread: keep it short.
         """
         self._on_click = callback
 

@@ -99,9 +99,7 @@ def _refuse(name: str, why: str, **given: Any) -> None:
 
 
 def _loaded(what: Any) -> tuple[Any, str]:
-    """Load what a name or path stands for; an object stays as it is. Returns the object or an environment's id, and a
-    title.
-    """
+    """Load what a name or path means; returns an object or an environment's id, and a title. Objects stay."""
     if isinstance(what, (str, os.PathLike)):
         return _of_text(os.fspath(what))
     known = (physics.Scene, physics.World, physics.Trajectory, physics.Recording)

@@ -160,9 +160,7 @@ class LiveSubject(WorldSubject):
         self.world.set_parameters(**{name: value * self._down if name == "gravity" else value})
 
     def prepare(self, name: str) -> Callable[[], None]:
-        """Make a world for another preset, for `switch`; returns a function that compiles it, which may run in another
-        thread.
-        """
+        """Make a world for another preset, for `switch`; returns a function that compiles it in any thread."""
         raise NotImplementedError
 
     def switch(self, name: str) -> None:
