@@ -10,7 +10,7 @@ Z_95 = 1.959963984540054  # 97.5 % quantile of the standard normal distribution
 def wilson(successes: int, trials: int, z: float = Z_95) -> tuple[float, float]:
     """Wilson score interval of a binomial proportion.
 
-    The set of p whose distance from the observed share is at most z standard errors *under p*:
+    It is the set of p whose distance from the observed share is at most z standard errors *under p*:
     ``(share - p)² <= z² p (1 - p) / trials``. Unlike the interval of the textbooks (Wald) it stays within
     [0, 1] and keeps its width at shares of 0 and 1.
 

@@ -17,7 +17,10 @@ from agents.trials import Trial
 
 
 def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = None) -> Iterator[Outcome]:
-    """See `trial.Launch`; `address` is not used. A process that dies takes the others' work since their checkpoints."""
+    """Run trials in `jobs` processes, see `trial.Launch`; `address` is not used.
+
+    If a process dies, all processes start again, and their trials continue from their last checkpoints.
+    """
     left = {trial.name: trial for trial in trials}
     for _ in range(1 + RETRIES):
         try:
@@ -33,7 +36,7 @@ def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = 
 
 
 def _end_with_parent() -> None:
-    """Let this process end as soon as the one that started it has; its trial goes on from a checkpoint, next time."""
+    """End this process as soon as its parent has ended; its trial continues from a checkpoint next time."""
 
     def watch() -> None:
         multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])

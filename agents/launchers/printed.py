@@ -1,4 +1,4 @@
-"""Trials as lines for a shell: for job arrays, xargs and schedulers of one's own."""
+"""Launcher that prints trials as shell commands, for job arrays, xargs and other schedulers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trials as tasks of a Ray cluster, whose nodes share the folder of the sweep."""
+"""Launcher that runs trials as tasks of a Ray cluster, whose nodes share the folder of the sweep."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from rigid_env.extras import require
 
 
 def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = None) -> Iterator[Outcome]:
-    """See `trial.Launch`; `address` is that of a cluster, None: one of this machine, of `jobs` processors.
+    """Run trials as Ray tasks, see `trial.Launch`.
 
-    A task takes one processor. Ray starts one whose worker or node is lost again, which goes on from its checkpoint.
-    One task warms the kernels of each node first.
+    `address` is that of a cluster; None starts one on this machine, with `jobs` processors. A task takes one processor.
+    If a worker or node is lost, Ray starts its task again, which continues from its checkpoint. A first task on each
+    node compiles or loads the kernels.
     """
     require("ray", purpose="--launcher ray")
     import ray

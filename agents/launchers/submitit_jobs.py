@@ -10,8 +10,8 @@ from agents.launchers.trial import Outcome, run_trial
 from agents.trials import Trial
 from rigid_env.extras import require
 
-POLL_EVERY = 1.0  # between two looks at the jobs [s]
-MINUTES = 24 * 60  # that a job may take
+POLL_EVERY = 1.0  # time between two checks of the jobs [s]
+MINUTES = 24 * 60  # longest time of a job [min]
 
 
 def launch(trials: Sequence[Trial], out: Path, jobs: int, address: str | None = None) -> Iterator[Outcome]:

@@ -1,4 +1,4 @@
-"""One trial, as a worker runs it."""
+"""Run of one trial in a worker, and the interface of launchers."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from agents.run import run_or_resume
 from agents.training import Interrupted
 from agents.trials import Trial
 
-PATIENCE = 60.0  # for a folder that a lost worker still holds [s]
-RETRIES = 3  # of a trial whose worker is lost
+PATIENCE = 60.0  # longest wait for a folder that a lost worker has locked [s]
+RETRIES = 3  # restarts of a trial whose worker is lost
 
 
 class Outcome(NamedTuple):
-    """End of a trial: its result, or an error."""
+    """Outcome of a trial: its result, or None and an error in one line."""
 
     name: str
     result: dict[str, Any] | None
@@ -28,13 +28,19 @@ class Outcome(NamedTuple):
 
 
 class Launch(Protocol):
-    """Run trials in the folder `out`, `jobs` at once; `address` says where."""
+    """Function that runs trials in the folder `out`, `jobs` at a time, and yields the outcome of each as it ends.
+
+    `address` says where they run; its meaning depends on the launcher.
+    """
 
     def __call__(self, trials: Sequence[Trial], out: Path, jobs: int, address: str | None) -> Iterator[Outcome]: ...
 
 
 def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE) -> Outcome:
-    """Run a trial, or go on with it; an error is its outcome, too, and only Ctrl-C ends more than the trial."""
+    """Run a trial, or continue it; an error becomes its outcome, and only Ctrl-C is raised.
+
+    It waits up to `patience` seconds if another process works on the trial.
+    """
     limit, is_told = time.monotonic() + patience, False
     while True:
         try:
@@ -53,6 +59,6 @@ def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE
 
 
 def _told(error: Exception) -> str:
-    """An error in one line."""
+    """Text of an error in one line."""
     words = " ".join(str(error).split())
     return words if isinstance(error, ValueError) else f"{type(error).__name__}: {words}"

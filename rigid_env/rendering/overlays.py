@@ -39,7 +39,9 @@ NEAR_WALL_ALPHA = 12
 
 
 def draw_goal(canvas, goal, room):
-    """Draw a disc with ring and centre mark on the floor of a `Room`, below the target of a `GoalView`; None: nothing.
+    """Draw a disc with ring and centre mark on the floor of a `Room`, below the target of a `GoalView`.
+
+    Nothing is drawn if the goal is None or has no target.
     """
     if goal is None or goal.pos is None:
         return

@@ -55,8 +55,8 @@ def tips_on_incline(on: Setting) -> Sequence[Check]:
     """The block stands upright on a rough incline: it tips over its lower edge iff tanθ > b/h.
 
     The case runs 1 % below and above. Above the limit the block rotates about the edge like an inverted pendulum of the
-    length R = √(b² + h²): φ̈ = λ² sinφ,
-    λ² = m g R/I. It starts where the line of its weight passes the edge by θ - atan(b/h).
+    length R = √(b² + h²): φ̈ = λ² sinφ, λ² = m g R/I. It starts where the line of its weight passes the edge by θ -
+    atan(b/h).
     """
     b, h, time = SIZE[1] / 2, SIZE[0] / 2, 1.5
     upright, reach = turned(math.pi / 2), math.hypot(b, h)
