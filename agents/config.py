@@ -66,7 +66,7 @@ class RunConfig:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     env: str

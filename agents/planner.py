@@ -70,7 +70,7 @@ class PlannerSettings:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     method: str = "mppi"

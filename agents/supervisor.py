@@ -158,8 +158,7 @@ class Supervisor(BaseCallback):
         self._checkpoint_every = max(CHECKPOINT_EVERY, (time.perf_counter() - start) / CHECKPOINT_SHARE)
 
     def _open_monitor(self) -> None:
-        """Open the monitor file, in the format of SB3's `Monitor`; a resumed run cuts it to its size at the checkpoint.
-        """
+        """Open the monitor file, in the format of SB3's `Monitor`; a resumed run cuts it to its size at that time."""
         is_new = self.history.monitor_size == 0
         self._monitor = self.run_folder.monitor.open("w" if is_new else "r+", newline="", encoding="utf-8")
         self._rows = csv.writer(self._monitor, lineterminator="\n")

@@ -145,7 +145,7 @@ class Force:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -186,7 +186,7 @@ class Impulse:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0

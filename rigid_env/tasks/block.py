@@ -77,7 +77,7 @@ class BlockTask(Task):
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     actions = Wrench(0, FORCE_SHARE, TORQUE_SHARE)

@@ -83,7 +83,7 @@ class Distribution(ABC):
         Raises
         ------
         ValueError
-            Naming the field, the value and what is allowed.
+            The message names the field, its value and what is allowed.
         """
         return read_numbers(field, value, worlds, self.length)
 

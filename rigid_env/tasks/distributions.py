@@ -241,7 +241,7 @@ def as_distribution(field: str, value, length: int | None = None) -> Distributio
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
     if isinstance(value, Distribution):
         if length is not None and value.length != length:

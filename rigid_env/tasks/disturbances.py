@@ -43,7 +43,7 @@ class Push:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -78,7 +78,7 @@ class Gust:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0

@@ -51,7 +51,7 @@ def parse_range(field: str, value: Any) -> Distribution:
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
     length = LENGTHS[field]
     if isinstance(value, Distribution):

@@ -112,7 +112,7 @@ class Task(Starts):
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     @takes(_Arguments)
