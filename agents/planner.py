@@ -181,7 +181,7 @@ class Planner:
         self._mean = np.einsum("n,nka->ka", weights / weights.sum(), knots)
 
     def _shift(self) -> None:
-        """Shift the plan by the control steps that are taken of it."""
+        """Move the plan ahead: drop the `replan` control steps that are executed now, and repeat the last one."""
         s = self.settings
         times = np.linspace(0, s.horizon - 1, s.knots) + s.replan
         plan = self._weights @ self._mean

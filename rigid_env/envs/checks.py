@@ -67,7 +67,7 @@ def check_task(
 
 
 class _Checks:
-    """The comparisons of `check_task`."""
+    """Comparisons that `check_task` makes for one task class."""
 
     def __init__(self, kind: type[Task], steps: int, settings: dict[str, Any]):
         self.kind, self.steps, self.settings = kind, steps, settings

@@ -16,7 +16,7 @@ from rigid_env.envs.task import TaskEnv
 CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
 
 NAMED = 5
-"""Number of names in the message about an unknown one."""
+"""Largest number of known names that the error about an unknown name lists."""
 
 
 def known_ids() -> list[str]:

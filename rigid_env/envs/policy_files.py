@@ -156,7 +156,7 @@ class Network:
     activation, output : str
         Activation after each layer except the last, and after the last; keys of `ACTIVATIONS`.
     mean, std : (entries,) array_like, optional
-        Subtracted from the observation, and dividing it.
+        The layers get (observation - mean) / std.
 
     Raises
     ------

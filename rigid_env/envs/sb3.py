@@ -240,7 +240,13 @@ class RigidVecEnv(VecEnv):
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
         """Call a method of the vector environment once, for all environments; the result is repeated for each index.
 
-        A method that depends on no environment's state (`goals.METHODS`) may be called for some of them.
+        `indices` may choose some of the environments only for a method that depends on no environment's state
+        (`goals.METHODS`). For other methods it must be None, or name all environments.
+
+        Raises
+        ------
+        ValueError
+            `indices` leaves out environments, and the method is another one.
         """
         if method_name not in METHODS:
             self._require_all("env_method", indices)

@@ -63,7 +63,7 @@ class Entry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each number."""
+        """Names of the entry's numbers, one for each."""
         return (self.name,) if isinstance(self.name, str) else self.name
 
     @property
@@ -151,7 +151,7 @@ class Observation:
 
     @property
     def names(self) -> list[str]:
-        """Name of each number."""
+        """Names of the numbers of the whole observation, one for each."""
         return [name for entry in self.entries for name in entry.names]
 
     def _make_targets(self, count: int) -> tuple[np.ndarray, list]:

@@ -24,7 +24,7 @@ from rigid_env.viewer.stage import LAYERS, Stage
 TITLE = "<title>Viser</title>"
 
 TIME_SLACK = 1e-9
-"""Tolerance for the time between two pictures, as a share of it: a look that is so little too early is taken."""
+"""Largest share of the time between two pictures by which a look may come too early and still be taken."""
 
 HEIGHT = 480
 """[px] Height of the frame in a notebook."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 EVERY = 16
-"""Steps from one kept state to the next, at first."""
+"""Number of steps between two kept states at first; it doubles when they exceed `ROOM`."""
 
 ROOM = 128 * 2**20
 """Memory that kept states may take [bytes]; beyond it every second state is dropped and the interval is doubled."""

@@ -34,7 +34,7 @@ def _side_by_side(on: Setting, scene: physics.Scene, pos, linvel, **more) -> phy
 
 
 def _rows(*parts) -> np.ndarray:
-    """Array (worlds, bodies, 3) of one array (worlds, 3) or (3,) for each body."""
+    """Stack arrays (worlds, 3) or (3,), one for each body, to an array (worlds, bodies, 3)."""
     count = max(len(np.atleast_2d(part)) for part in parts)
     return np.stack([np.broadcast_to(part, (count, 3)) for part in parts], axis=1).astype(float)
 
@@ -152,7 +152,11 @@ def passing(on: Setting) -> Sequence[Check]:
 
 
 def _offset(across, other, R, clearance: float) -> float:
-    """Distance along `across` at which a ball passes the turned block at this clearance, both seen along the way."""
+    """Offset of a ball's path along `across` [m] for which the ball passes the turned block at a clearance [m].
+
+    Seen along the path, `across` and `other` are the axes of the picture, and the clearance is the gap in it. R is the
+    rotation matrix of the block.
+    """
     angle = np.linspace(0, 2 * math.pi, 3601)
     n = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * other
     reach = np.abs(n @ R) @ (0.5, 0.3, 0.2) + 0.4

@@ -1,6 +1,7 @@
 """Hard case of random scenes, parameters, states and wrenches in many worlds at once, checked against laws.
 
-`random_draws` draws them. `benchmarks.soak` runs the same for as long as the user likes.
+The functions that draw are in `random_draws`. The program `benchmarks.soak` runs such scenes for as long as the user
+likes.
 """
 
 from __future__ import annotations

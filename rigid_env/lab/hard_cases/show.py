@@ -18,7 +18,7 @@ LEGEND = "✓ holds   ✗ fails   - not supported"
 
 
 def came_out(outcome: Outcome) -> str:
-    """Text of the check with the smallest margin; without a check the reason for that."""
+    """Describe the check with the smallest margin: its value and limit. Without checks: the reason for having none."""
     check = outcome.tightest
     if check is None:
         return outcome.reason
@@ -29,7 +29,11 @@ def came_out(outcome: Outcome) -> str:
 
 
 def margin(outcome: Outcome) -> str:
-    """Text of the share of the tightest limit that is left."""
+    """Smallest margin of the outcome's checks as text.
+
+    A margin is the part of a limit that the checked value leaves unused, in percent. A value far over its limit
+    (margin of -10 or less) is given as a multiple of the limit.
+    """
     check = outcome.tightest
     if check is None:
         return "-"

@@ -37,7 +37,7 @@ def cells(row: Row) -> tuple[Text, ...]:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Text of a number with some digits, and k or M for thousands or millions."""
+    """Text of a number with `digits` significant digits, and k for thousands or M for millions."""
     return number_range(value, value, digits)
 
 

@@ -234,7 +234,7 @@ def along_incline(path: Path) -> np.ndarray:
 
 
 def slipping_error(path: Path) -> float:
-    """Error of the distance that the block slides in 10 s, ½ g (sin θ - μ cos θ) t² [m]."""
+    """Error of the distance that the block slides down the incline in 10 s, ½ g (sin θ - μ cos θ) t² [m]."""
     pull = G * (math.sin(INCLINE) - 0.99 * math.tan(INCLINE) * math.cos(INCLINE))
     return abs(along_incline(path)[-1] - 0.5 * pull * 100.0)
 

@@ -63,7 +63,7 @@ class Drake:
         logging.getLogger("drake").setLevel(logging.ERROR)
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """Options by setting: the discrete default, other contact approximations, and RK3 with error control."""
+        """Options of Drake by the name of the setting: contact approximations, and RK3 with error control."""
         if not walls(scene):
             return FREE
         return BOUNCING if restitution(scene) else RESTING

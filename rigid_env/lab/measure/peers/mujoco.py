@@ -51,7 +51,11 @@ class MuJoCo:
         mujoco.set_mju_user_warning(lambda text: None)
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """Options by setting: other integrators for free motion, stiff contacts for rest, restitution for impacts."""
+        """Options of MuJoCo by the name of the setting.
+
+        Without walls the settings differ in the integrator, with walls in the contacts. A scene with restitution has
+        settings of its own, whose contacts rebound.
+        """
         if not walls(scene):
             return FREE
         return BOUNCING if restitution(scene) else RESTING

@@ -45,7 +45,7 @@ class PyBullet:
         self.version = version("pybullet")
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """Options by setting: kind of coordinates, iterations, and the distance at which a contact is dropped."""
+        """Options of PyBullet by the name of the setting: coordinates, iterations, distance at which contacts end."""
         return TOUCHING if walls(scene) else FREE
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
