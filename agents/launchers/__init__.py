@@ -1,6 +1,6 @@
 """Places where the trials of a sweep run. A launcher yields the outcome of each as it ends, in any order.
 
-To add one: write a function as `local.launch` in a module here, and name it in `agents.sweep.LAUNCHERS`. A trial is
-`run_trial`, whose folder is the same wherever it runs; one that is lost is started again, and goes on from its last
-checkpoint.
+To add a launcher: write a function like `local.launch` in a module here, and name it in `agents.sweep.LAUNCHERS`.
+`run_trial` runs one trial. The folder of a trial is the same wherever the trial runs, so a trial that is lost can
+be started again, and continues from its last checkpoint.
 """

@@ -76,7 +76,7 @@ class Listener:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the calls so far, and what was recorded of them."""
+        """Forget all recorded calls, with their computing time, events and faults."""
         self.calls: list[Call] = []
         self.events: list[Event] = []
         self.seconds = self.penetration = self.residual = 0.0

@@ -47,9 +47,11 @@ def open_subject(
         `physics.Scene`, `World`, `Trajectory`, `Recording`, or an environment of `rigid_env`, wrapped or not. A world
         or an environment is copied; the copy continues from its present state.
     accuracy : str or physics.Accuracy, optional
-        None: that of a world or an environment; otherwise ``balanced``.
+        Accuracy of the simulation. None: a world or an environment keeps its own, a scene gets ``balanced``.
+        Not for a recording or a trajectory.
     dt : float, optional
-        Step of a scene or a world [s]. None: 0.01, or that of the world. Environments have steps of their own.
+        Step of a scene or a world [s]. None: a world keeps its own, a scene gets 0.01. Not for an environment, a
+        recording or a trajectory.
     seed : int
         Seed of the first episode and of random actions.
     policy : path, callable or model, optional

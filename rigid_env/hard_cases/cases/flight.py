@@ -32,11 +32,11 @@ def thin_plate(on: Setting) -> Sequence[Check]:
     |L|/I_t, and the plate turns about d at n = ω_d (1 - I_d/I_t) (Landau and Lifshitz, *Mechanics*, section 33). So the
     attitude is q(t) = turn(L, Ω t) q(0) turn(d, n t).
 
-    Limits: every turn of 0.06 rad rounds the attitude. So the angle between d and L, and with it the energy, walks at
-    random by √N of these roundings in N turns. The limit is ten times this, since equal turns round alike. Both rates
-    depend on that angle. So the error of the attitude is this walk times the whole angle A that the plate has turned,
-    with N = A/0.06. The engine stores L unchanged; here it is computed from attitude and angular velocity, which rounds
-    it.
+    Limits: every rotation by 0.06 rad rounds the attitude. So the angle between d and L, and with it the energy, takes
+    a random walk of √N roundings in N of these rotations. The limit is ten times this walk, since the roundings of
+    equal rotations are not independent. The rates Ω and n depend on the angle between d and L. So the error of the
+    attitude is the walk times the whole angle A that the plate has turned, with N = A/0.06. The engine stores L
+    unchanged; here it is computed from attitude and angular velocity, which rounds it.
     """
     checks = []
     for spin in (1e3, 1e4, 1e5):

@@ -173,8 +173,8 @@ def symmetry(on: Setting) -> Sequence[Check]:
     """A scene rotated by 90° or mirrored has the same motion; with two bodies swapped, the same bits.
 
     Limit: attitudes of 90° are not exact in binary, and sums are added in another order. This rounds at the start and
-    in every step. Contact problems that are solved to a tolerance add this share of the body's radius. Both are
-    multiplied by the scene's growth.
+    in every step. Contact problems are solved to a tolerance, which adds an error of the tolerance times the body's
+    radius. Both errors are multiplied by the scene's growth of small differences.
     """
     path = _path(on, _turned_scene(np.eye(3)))
     growth = _growth(on, _throw, _path(on, _throw()))
