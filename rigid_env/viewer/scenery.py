@@ -13,7 +13,7 @@ from rigid_env.rendering.layout import FADE_LENGTH, Room, default_camera, is_flo
 from rigid_env.viewer.interface import Look
 
 SIGHT = 12.0
-"""First distance of the camera from its target [drawn units]; viser's shadows reach 20 units in any scene."""
+"""Distance of the camera from its target at first [drawn units]; viser's shadows reach 20 units in any scene."""
 
 WINDOW = (1000, 640)
 """[px] Window in which the whole room is visible at first."""

@@ -154,7 +154,10 @@ def elastic_error(path: Path, bounces: int = 10) -> float:
 
 
 def damped_error(path: Path) -> float:
-    """Larger one of two errors: of the first apex, e² h [m], and of the time to rest, √(2h/g) (1 + e)/(1 - e) [s]."""
+    """Larger one of two errors of a block that falls from h: first apex e² h [m], and time to rest [s].
+
+    The time to rest is √(2h/g) (1 + e)/(1 - e), for the restitution e.
+    """
     found, rest = flights(path), time_of_rest(path)
     if not found:
         return math.inf

@@ -99,7 +99,11 @@ def _times(flight: np.ndarray) -> np.ndarray:
 
 
 def _equations(flight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear equations of one flight for (s, g): rows (3 n, 4), right sides (3 n,); c and v are eliminated."""
+    """Linear equations of one flight of n frames: matrix (3 n, 4) and right sides (3 n,).
+
+    The unknowns are those of `measure_flight` that all flights share: the vector s and the strength of gravity. The
+    flight's own start c and velocity v are eliminated.
+    """
     t, R = _times(flight), attitude(flight[:, data.QUAT]).as_matrix()
     basis, _ = np.linalg.qr(np.stack([np.ones_like(t), t], axis=1))
     rows = np.zeros((3, len(t), 4))
