@@ -108,7 +108,7 @@ class Run:
         return record
 
     def _follow(self) -> None:
-        """Let the ghost take the same step; a ghost that fails is removed, with a message in `fault`."""
+        """Let the ghost take the step that the subject has just taken; remove a ghost that fails, and set `fault`."""
         if self.ghost is None:
             return
         try:

@@ -155,7 +155,7 @@ def leave(body: BodyView, direction) -> np.ndarray:
 
 
 def _stay(body: BodyView, origin, direction):
-    """First and last s for which the point origin + s direction is in a body, in the body's frame; else None."""
+    """First and last s for which origin + s direction, in the body's frame, is in the body; None if there is no s."""
     if body.kind in ("sphere", "ellipsoid"):
         return _stay_in_ball(origin / body.dimensions, direction / body.dimensions)
     normals, offsets = _planes(body)

@@ -126,9 +126,9 @@ def far_away(on: Setting) -> Sequence[Check]:
     Contact problems that are solved to a tolerance may have other solutions, which differ by the tolerance times the
     body's radius.
 
-    Limit in the moving frame, without friction: each step adds the same h v to the position. While the position keeps
-    its power of two, these sums are rounded to the same side, by up to half a last digit of the final 256 m in each
-    step.
+    Limit in the moving frame, without friction: each step adds the same h v to the position. While the position stays
+    between two powers of two, all these sums are rounded in the same direction, by up to half the last binary digit of
+    the final 256 m in each step.
     """
     far, fast = 2.0**20, 128.0
     path = _path(on, _throw())
