@@ -1,10 +1,10 @@
-"""Cost of training at a coarse accuracy when the world is exact: ``python -m agents.accuracy_transfer``.
+"""Success of policies trained at a coarse accuracy, at an exact one: ``python -m agents.accuracy_transfer``.
 
-One policy is trained per accuracy, with the same hyperparameters, seed and target; when to stop is judged at the
-accuracy that it trains at, as one would who has no other. Each is then evaluated on the same fresh episodes at its
-own accuracy and at `reference`. The table sets success at `reference` against the time the training took.
+One policy is trained per accuracy, with the same hyperparameters, seed and target. The end of training is decided at
+the accuracy of the training, as if no other one were available. Each policy is then evaluated on the same fresh
+episodes, at its own accuracy and at `reference`. The table shows success at `reference` and the time of training.
 
-A policy that has been trained already is not trained again: interrupted, the program goes on where it was.
+A policy that has been trained already is not trained again, so an interrupted program continues with the next one.
 """
 
 from __future__ import annotations
@@ -34,17 +34,18 @@ EPISODES = 500
 
 @dataclass(frozen=True)
 class Transfer:
-    """A policy trained at one accuracy.
+    """Policy trained at one accuracy, and its evaluations.
 
     Attributes
     ----------
     accuracy : str
         Preset of the engine in training.
     training_seconds : float
+        Time of training [s].
     steps : int
         Environment steps of training.
     is_target_reached : bool
-        Whether training ended at its target, not at its limit.
+        True if training ended at its target, False if at its limit.
     own, truth : dict
         Evaluations at that accuracy and at `reference` (`agents.evaluate.Episodes.summary`).
     """
@@ -58,12 +59,12 @@ class Transfer:
 
 
 def parse_accuracies(names: str) -> list[str]:
-    """Presets from their names with commas.
+    """Split a list of presets with commas, and check the names.
 
     Raises
     ------
     ValueError
-        If one is none.
+        If a name is no preset.
     """
     found = [name.strip() for name in names.split(",")]
     unknown = [name for name in found if name not in PRESETS]
@@ -73,12 +74,12 @@ def parse_accuracies(names: str) -> list[str]:
 
 
 def trained(config: RunConfig, run: RunFolder, console: Console) -> dict[str, Any]:
-    """Return the result of `agents.train.train` for a run; train if that has not been done in this folder.
+    """Return the result of `agents.train.train` for a run; train if the folder has no result yet.
 
     Raises
     ------
     ValueError
-        If the folder holds another run.
+        If the folder contains another run.
     """
     if run.model.is_file() and run.result.is_file():
         if run.read_config() != config:
@@ -91,15 +92,16 @@ def trained(config: RunConfig, run: RunFolder, console: Console) -> dict[str, An
 
 
 def transfer(config: RunConfig, run: RunFolder, episodes: int, console: Console) -> Transfer:
-    """Train (once) and evaluate one policy.
+    """Train one policy, unless it is trained already, and evaluate it.
 
     Parameters
     ----------
     config : RunConfig
-        Its `accuracy` is the preset's name.
+        Configuration; its `accuracy` is the name of a preset.
     run : RunFolder
+        Folder of the run.
     episodes : int
-        Per evaluation.
+        Episodes per evaluation.
     console : rich.console.Console
     """
     result = trained(config, run, console)
@@ -114,7 +116,7 @@ def transfer(config: RunConfig, run: RunFolder, episodes: int, console: Console)
 
 
 def make_table(env: str, rows: list[Transfer]) -> Table:
-    """Success against training time."""
+    """Table of success and training time, a row for each policy."""
     names = "training, s", "million\nsteps", "success\nthere", f"success at\n{TRUTH}", "95 %"
     table = Table(["trained at", *number_columns(*names)], f"{env}: trained at an accuracy, judged at {TRUTH}")
     for row in rows:

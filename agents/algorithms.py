@@ -1,4 +1,4 @@
-"""Environments and models of a run, made from its configuration."""
+"""Make environments and models of Stable-Baselines3 from the configuration of a run."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from physics.keywords import nearest_first
 from rigid_env import RigidVecEnv
 from rigid_env.envs.named import not_there
 
-# How Python, and `physics.keywords` with it, says that there is no such argument.
+# Text in the errors of Python and of `physics.keywords` for an unknown argument.
 UNKNOWN_ARGUMENT = "unexpected keyword argument"
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
 
 def make_single_env(env: str, **arguments: Any) -> gym.Env:
-    """A single environment; arguments as `make_vector_env`, all except `num_envs`."""
+    """Make a single environment; arguments as of `make_vector_env`, without `num_envs`."""
     return _make(gym.make, env, arguments)
 
 
 def make_vector_env(env: str, num_envs: int, **arguments: Any) -> gym.vector.VectorEnv:
-    """The native batch of an environment.
+    """Make the native batch of an environment.
 
     Parameters
     ----------
     env : str
         Gymnasium id.
     num_envs : int
+        Number of worlds.
     **arguments
-        Of the environment, `autoreset_mode` and `threads` among them. `accuracy` may be a dict, too: the
-        fields of a `physics.Accuracy`.
+        Arguments of the environment, with `autoreset_mode` and `threads`. `accuracy` may also be a dict with the fields
+        of a `physics.Accuracy`.
 
     Raises
     ------
@@ -68,7 +69,7 @@ def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any
 
 
 def make_training_env(config: RunConfig) -> RigidVecEnv:
-    """The batch that a run trains on, seeded: world i draws its episodes from the seed `config.seed` + i."""
+    """Make the batch that a run trains on; world i draws its episodes from the seed `config.seed` + i."""
     vector_env = make_vector_env(
         config.env,
         config.num_envs,
@@ -83,18 +84,18 @@ def make_training_env(config: RunConfig) -> RigidVecEnv:
 
 
 def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, Any]:
-    """Keyword arguments of the algorithm's class, with what YAML cannot hold made from names and numbers.
+    """Keyword arguments of the algorithm's class, with objects that YAML cannot hold made from names and numbers.
 
     Parameters
     ----------
     config : RunConfig
     action_size : int
-        Numbers of an action.
+        Length of an action.
 
     Raises
     ------
     ValueError
-        If `torch.nn` has no such activation, or an entry has keys that nothing reads.
+        If `torch.nn` has no such activation, or an entry has unknown keys.
     """
     arguments = dict(config.algorithm)
     known = [*inspect.signature(CLASSES[config.algo]).parameters, "hindsight", "action_noise"]
@@ -119,31 +120,31 @@ def algorithm_arguments(config: RunConfig, action_size: int = 6) -> dict[str, An
 
 
 def _slow_noise(given: dict[str, float], size: int) -> OrnsteinUhlenbeckActionNoise:
-    """Noise that lasts for some steps: white noise cancels out before a block has moved."""
+    """Make exploration noise that is correlated over steps; white noise cancels out before a block has moved."""
     if given.keys() != {"sigma", "theta"}:
         raise ValueError(f"action_noise has the keys {', '.join(given)}; allowed are sigma, theta")
     return OrnsteinUhlenbeckActionNoise(np.zeros(size), np.full(size, given["sigma"]), given["theta"], dt=1.0)
 
 
 def _falling_rate(given: dict[str, float]) -> Callable[[float], float]:
-    """Learning rate that falls in a line from the first step of a run to `max_steps`."""
+    """Make a learning rate that decreases linearly from the first step of a run to `max_steps`."""
     if given.keys() != {"start", "end"}:
         raise ValueError(f"learning_rate has the keys {', '.join(given)}; allowed are a number, or start, end")
     return partial(_between, given["start"], given["end"])
 
 
 def _between(start: float, end: float, left: float) -> float:
-    """Value where the share `left` of a run is left."""
+    """Linear interpolation from `start` to `end`, where the share `left` of the run is still to come."""
     return end + (start - end) * left
 
 
 def make_model(config: RunConfig, env: RigidVecEnv) -> BaseAlgorithm:
-    """A new model on the CPU, where small networks are fastest.
+    """Make a new model on the CPU, where small networks are fastest.
 
     Raises
     ------
     ValueError
-        If the algorithm refuses its arguments, in the words of Stable-Baselines3.
+        If the algorithm refuses its arguments; the message quotes Stable-Baselines3.
     """
     policy = "MultiInputPolicy" if isinstance(env.observation_space, gym.spaces.Dict) else "MlpPolicy"
     arguments = algorithm_arguments(config, env.action_space.shape[0])

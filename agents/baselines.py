@@ -1,4 +1,4 @@
-"""Policies to compare trained agents with: uniformly random, and the controllers written by hand.
+"""Policies for comparison with trained agents: random actions, and handwritten controllers.
 
 A policy is a function from observations (n, entries) to actions (n, axes).
 """
@@ -14,7 +14,7 @@ __all__ = ["CONTROLLERS", "Policy", "baseline_policy", "random_policy", "reach_c
 
 
 def random_policy(seed: int = 0, axes: int = AXES) -> Policy:
-    """Actions drawn uniformly from the action space.
+    """Make a policy whose actions are drawn uniformly from the action space.
 
     Parameters
     ----------
@@ -40,14 +40,15 @@ def action_size(env_id: str) -> int:
 
 
 def baseline_policy(name: str, env_id: str, seed: int = 0) -> Policy:
-    """A baseline by its name.
+    """Make a baseline policy by its name.
 
     Parameters
     ----------
     name : {"random", "controller"}
     env_id : str
+        Gymnasium id of the environment.
     seed : int
-        Of the random policy.
+        Seed of the random policy.
 
     Returns
     -------

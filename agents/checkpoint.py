@@ -1,8 +1,8 @@
-"""Checkpoints: everything a run needs to go on as if it had never stopped.
+"""Checkpoints: everything that a run needs to continue as if it had never stopped.
 
-A checkpoint is a folder named by its step, with the model and its optimiser (`model.zip`), the replay buffer
-of SAC, and `state.pkl`: the environments in the middle of their episodes, all random generators, and the
-history of the run. It is written beside its place and renamed, so that an interrupted one is never found.
+A checkpoint is a folder named by its step. It contains the model and its optimiser (`model.zip`), the replay buffer of
+SAC, and `state.pkl`: the environments in the middle of their episodes, all random generators, and the history of the
+run. It is written under another name and then renamed, so that an incomplete one is never found.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from agents.baselines import Policy
 from agents.config import RunConfig, RunFolder
 from rigid_env.envs.policy_files import WITHOUT_REPLAY, greedy, tell_code_runs
 
-KEPT = 3  # newest checkpoints of a run; older ones are deleted
+KEPT = 3  # number of newest checkpoints that are kept; older ones are deleted
 
 MODEL, REPLAY, STATE = "model.zip", "replay_buffer.pkl", "state.pkl"
 
 
 def save_checkpoint(folder: Path, model: BaseAlgorithm, history: Any) -> Path:
-    """Write a checkpoint; call it between two updates, not within one.
+    """Write a checkpoint; call it between two updates of the policy, not within one.
 
     Parameters
     ----------
     folder : Path
-        Of all checkpoints of the run.
+        Folder of all checkpoints of the run.
     model : BaseAlgorithm
     history : object
-        Picklable; `load_checkpoint` gives it back.
+        Any picklable object; `load_checkpoint` returns it.
 
     Returns
     -------
@@ -73,11 +73,10 @@ def list_checkpoints(folder: Path) -> list[Path]:
 
 
 def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, Any]:
-    """The newest checkpoint of a run: model, environments and random generators as they were.
+    """Load the newest checkpoint of a run: model, environments and random generators as they were.
 
-    Code in its files runs while they are read; a line on standard error says so.
-
-    The same computer, versions and number of threads given, training goes on with the same bits.
+    Code in its files runs while they are read; a line on standard error says so. On the same computer, with the same
+    versions and number of threads, training continues with the same bits.
 
     Parameters
     ----------
@@ -88,12 +87,12 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     -------
     model : BaseAlgorithm
     history : object
-        Given to `save_checkpoint`.
+        Object that was given to `save_checkpoint`.
 
     Raises
     ------
     ValueError
-        If there is none.
+        If there is no checkpoint.
     """
     found = list_checkpoints(run.checkpoints)
     if not found:
@@ -111,16 +110,16 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
 
 
 def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
-    """The trained policy of a run, acting without exploration; see `load_trained`."""
+    """Load the configuration and the trained policy of a run; the policy acts without exploration."""
     config, model = load_trained(run)
     return config, greedy(model)
 
 
 def load_trained(run: RunFolder) -> tuple[RunConfig, BaseAlgorithm]:
-    """The trained model of a run, for acting.
+    """Load the configuration and the trained model of a run, for acting.
 
-    It is that of `model.zip`, or of the newest checkpoint if training has not ended. Code in the file runs while it is
-    read; a line on standard error says so.
+    The policy is read from `model.zip`, or from the newest checkpoint if training has not ended. Code in the file runs
+    while it is read; a line on standard error says so.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Settings of a run, from YAML keyed by environment id and algorithm, and the places of its files."""
+"""Configuration of a run, with hyperparameters from a YAML file, and the paths of the run's files."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ HYPERPARAMETERS = Path(__file__).with_name("hyperparameters.yml")
 
 ALGORITHMS = ("ppo", "sac")
 
-LOCK = ".lock"  # in the folder of a run
+LOCK = ".lock"  # file in the folder of a run
 
-# Fields that may change while a run goes on from its checkpoint.
+# Fields that may change when a run continues from its checkpoint.
 CHANGEABLE = ("target", "max_steps", "threads", "evaluation_accuracy")
 
 
 class RunInUse(ValueError):
-    """Error of a run that another process works on."""
+    """Error of a run that another process is working on."""
 
 
 @dataclass(frozen=True)
 class RunConfig:
-    """Everything that decides a run; written to `config.yaml` in its folder.
+    """Everything that decides a run; it is written to `config.yaml` in the run's folder.
 
     Parameters
     ----------
@@ -40,32 +40,33 @@ class RunConfig:
         Gymnasium id.
     algo : {"ppo", "sac"}
     seed : int
-        Of the policy's weights, the exploration and the environments.
+        Seed of the policy's weights, the exploration and the environments.
     num_envs : int
-        Worlds of the training batch.
+        Number of worlds in the training batch.
     max_steps : int
         Environment steps, of all worlds together, after which training ends.
     target : float
         Success rate at which training ends, in (0, 1].
     accuracy : str or dict
-        Of the engine in training: a preset, or the fields of a `physics.Accuracy`.
+        Accuracy of the engine in training: a preset, or the fields of a `physics.Accuracy`.
     evaluation_accuracy : str or dict
-        The same in evaluation and videos.
+        The same for evaluation and videos.
     threads : int
-        Of the engine.
+        Threads of the engine.
     torch_threads : int
+        Threads of torch.
     algorithm : dict
-        Keyword arguments of the class in Stable-Baselines3; ``policy_kwargs.activation_fn`` by its name in
-        `torch.nn`. ``hindsight`` holds the arguments of its `HerReplayBuffer`, for environments with goals;
-        ``action_noise`` the ``sigma`` and ``theta`` of an Ornstein-Uhlenbeck process, per control step. A
-        ``learning_rate`` with ``start`` and ``end`` falls in a line until `max_steps`.
+        Keyword arguments of the class in Stable-Baselines3. ``policy_kwargs.activation_fn`` is a name in `torch.nn`.
+        ``hindsight`` has the arguments of `HerReplayBuffer`, for environments with goals. ``action_noise`` has
+        ``sigma`` and ``theta`` of an Ornstein-Uhlenbeck process, per control step. A ``learning_rate`` with ``start``
+        and ``end`` decreases linearly until `max_steps`.
     env_kwargs : dict
         Further arguments of the environment.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     env: str
@@ -105,17 +106,17 @@ class RunConfig:
         return {**self.env_kwargs, "accuracy": self.evaluation_accuracy}
 
     def write(self, path: Path) -> None:
-        """Write as YAML."""
+        """Write the configuration as YAML."""
         path.write_text(yaml.safe_dump(asdict(self), sort_keys=False), encoding="utf-8")
 
 
 def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> dict[str, Any]:
-    """The entry of an environment and an algorithm in a file of hyperparameters.
+    """Read the entry of an environment and an algorithm in a file of hyperparameters.
 
     Parameters
     ----------
     env : str
-        Gymnasium id; a module to import before a colon is left out.
+        Gymnasium id, without the module that may stand before a colon.
     algo : str
     path : Path
 
@@ -140,7 +141,7 @@ def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> d
 
 
 def default_algorithm(env: str, path: Path = HYPERPARAMETERS) -> str:
-    """The first algorithm of an environment in a file of hyperparameters; a ValueError where there is no such entry."""
+    """First algorithm of an environment in a file of hyperparameters; a ValueError if the environment is not in it."""
     return next(iter(_entries(env, path)))
 
 
@@ -150,7 +151,7 @@ def environments_of(path: Path = HYPERPARAMETERS) -> list[str]:
 
 
 def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
-    """The entries of an environment, by algorithm."""
+    """Entries of an environment in a file of hyperparameters, by algorithm."""
     table = yaml.safe_load(path.read_text(encoding="utf-8"))
     if env not in table:
         raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}")
@@ -158,7 +159,7 @@ def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
 
 
 def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:
-    """The configuration of a new run: hyperparameters of the file, with those `changes` that are not None.
+    """Make the configuration of a new run: hyperparameters of the file, with those `changes` that are not None.
 
     Raises
     ------
@@ -171,63 +172,67 @@ def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **
 
 
 def change(config: RunConfig, **changes: Any) -> RunConfig:
-    """The same configuration with those `changes` of fields that are not None; see `agents.settings` for entries."""
+    """Copy of a configuration with those `changes` of fields that are not None.
+
+    `agents.settings` changes entries of its dicts.
+    """
     return replace(config, **{name: value for name, value in changes.items() if value is not None})
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Places of the files of a run.
+    """Paths of the files of a run.
 
     Parameters
     ----------
     path : Path
+        Folder of the run.
     """
 
     path: Path
 
     @property
     def config(self) -> Path:
-        """The configuration, YAML."""
+        """Path of the configuration (YAML)."""
         return self.path / "config.yaml"
 
     @property
     def model(self) -> Path:
-        """The trained model, by Stable-Baselines3."""
+        """Path of the trained model, in Stable-Baselines3's format."""
         return self.path / "model.zip"
 
     @property
     def checkpoints(self) -> Path:
-        """Folders named by their step, see `agents.checkpoint`."""
+        """Folder of the checkpoints, which are named by their step, see `agents.checkpoint`."""
         return self.path / "checkpoints"
 
     @property
     def monitor(self) -> Path:
-        """Every training episode: return, length, seconds, success; read by SB3's `load_results`."""
+        """Path of the list of training episodes: return, length, seconds, success; `load_results` of SB3 reads it."""
         return self.path / "monitor.csv"
 
     @property
     def curve(self) -> Path:
-        """The learning curve; `.png` beside it."""
+        """Path of the learning curve (CSV); a `.png` with the same name is its picture."""
         return self.path / "curve.csv"
 
     @property
     def evaluation(self) -> Path:
-        """Evaluation of the trained model on fresh episodes, JSON."""
+        """Path of the evaluation of the trained model on fresh episodes (JSON)."""
         return self.path / "evaluation.json"
 
     @property
     def result(self) -> Path:
-        """Result that `--json` writes."""
+        """Path of the run's result (JSON)."""
         return self.path / "result.json"
 
     @property
     def video(self) -> Path:
-        """Some episodes; `.gif` where there is no ffmpeg."""
+        """Path of the video of some episodes; without ffmpeg it ends in `.gif`."""
         return self.path / "episodes.mp4"
 
     def read_config(self) -> RunConfig:
-        """The configuration of the run.
+        """Read the configuration of the run.
 
         Raises
         ------
@@ -240,12 +245,12 @@ class RunFolder:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other processes from writing into the run, as a context; it ends with the process, however that ends.
+        """Context manager that keeps other processes from writing into the run; the lock also ends with the process.
 
         Raises
         ------
         RunInUse
-            If another one writes into it.
+            If another process writes into it.
         """
         lock = FileLock(self.path / LOCK)
         try:
@@ -258,7 +263,7 @@ class RunFolder:
             lock.release()
 
     def discard(self) -> None:
-        """Remove the folder if nothing was written into it, and the one above if that was all."""
+        """Remove the folder if the run has written nothing into it, and the folder above if it is then empty."""
         if {path.name for path in self.path.iterdir()} <= {LOCK}:
             shutil.rmtree(self.path)
             with suppress(OSError):
@@ -266,7 +271,7 @@ class RunFolder:
 
 
 def make_folder(out: Path, config: RunConfig) -> RunFolder:
-    """Make a folder in `out` that did not exist, named by what is trained and when; no two processes get the same."""
+    """Make a new folder in `out`, named by environment, algorithm, seed and time; no two processes get the same one."""
     name = f"{config.env.rpartition('/')[2]}-{config.algo}-s{config.seed}-{time.strftime('%Y%m%d-%H%M%S')}"
     path, count = out / name, 1
     while True:

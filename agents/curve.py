@@ -1,4 +1,4 @@
-"""The history of a run: a window over its last episodes, and the learning curve with its CSV and picture."""
+"""History of a run: statistics of its last episodes, and the learning curve as CSV and as a picture."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from typing import Any
 
 from physics.work_precision.frontier_plot import add_legend
 
-WINDOW = 500  # finished episodes whose mean is shown, and held against the target
+WINDOW = 500  # number of last episodes whose mean is shown and compared with the target
 
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """A point of the learning curve.
+    """Point of the learning curve.
 
     Parameters
     ----------
     steps : int
         Environment steps of all worlds together.
     seconds : float
-        Of training, interruptions left out [s].
+        Time of training, without interruptions [s].
     episodes : int
-        Finished so far.
+        Episodes that have ended.
     success_rate, mean_return, mean_length : float
-        Over the last `WINDOW` episodes, as explored; nan before the first ends.
+        Means over the last `WINDOW` episodes, with exploration; NaN before the first episode has ended.
     """
 
     steps: int
@@ -41,26 +41,28 @@ class CurvePoint:
 
 @dataclass
 class History:
-    """Record of a run's episodes; part of every checkpoint.
+    """Record of a run's episodes, which is part of every checkpoint.
 
     Parameters
     ----------
     seconds : float
-        Of training so far [s].
+        Time of training so far [s].
     episodes : int
-        Finished so far.
+        Episodes that have ended.
     monitor_size : int
         Bytes of the monitor file at the checkpoint.
     next_confirmation : int
-        Number of finished episodes from which on the target may be confirmed.
+        Number of ended episodes from which on the target may be confirmed.
     confirmations : int
-        Made so far.
+        Confirmations that have been tried.
     points : list of CurvePoint
+        Learning curve.
     window : deque of (success, return, length)
+        Last `WINDOW` episodes.
     noise : ActionNoise, optional
-        Of the exploration, at the checkpoint: Stable-Baselines3 resets it where learning goes on.
+        Exploration noise at the checkpoint, since Stable-Baselines3 resets it when learning continues.
     reached : float
-        Largest target that was reached, 0 without one.
+        Largest target that was reached; 0 if none was.
     """
 
     seconds: float = 0.0
@@ -74,19 +76,19 @@ class History:
     reached: float = 0.0
 
     def add(self, success: bool, episode_return: float, length: int) -> None:
-        """Count a finished episode."""
+        """Add an episode that has ended."""
         self.episodes += 1
         self.window.append((success, episode_return, length))
 
     def point(self, steps: int) -> CurvePoint:
-        """Return the present point of the run's curve."""
+        """Return the point of the learning curve after `steps` environment steps."""
         columns = zip(*self.window) if self.window else ((float("nan"),),) * 3
         means = [sum(column) / len(column) for column in columns]
         return CurvePoint(steps, round(self.seconds, 3), self.episodes, *means)
 
 
 def write_curve(points: list[CurvePoint], path: Path) -> None:
-    """Write the learning curve as CSV; an older file is replaced at once."""
+    """Write the learning curve as CSV; an older file is replaced in one operation."""
     partial = path.with_suffix(".partial")
     with partial.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, [f.name for f in fields(CurvePoint)], lineterminator="\n")
@@ -103,13 +105,13 @@ def read_curve(path: Path) -> list[dict[str, float | None]]:
 
 
 def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) -> None:
-    """Draw success rate and mean return over steps and over time as PNG.
+    """Draw success rate and mean return over steps and over time, as PNG.
 
     Parameters
     ----------
     points : list of CurvePoint
     target : float
-        Success rate to draw a line at.
+        Success rate at which a line is drawn.
     title : str
     path : Path
     """
@@ -136,7 +138,7 @@ def plot_curve(points: list[CurvePoint], target: float, title: str, path: Path) 
 
 
 def plot_transfer(rows: list, title: str, path: Path) -> None:
-    """Draw success at `reference` against training time as PNG, with intervals of 95 %, one mark per accuracy.
+    """Draw success at `reference` against training time as PNG, with 95 % intervals, one mark per accuracy.
 
     Parameters
     ----------

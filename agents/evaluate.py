@@ -1,7 +1,7 @@
 """Success rate of a trained agent or a baseline: ``python -m agents.evaluate RUN_DIR``.
 
-Each of a fixed set of seeds gets exactly one episode, run to its end. Counting whichever episodes end first
-would favour short ones, that is, successes.
+Each of a fixed set of seeds gets exactly one episode, which is run to its end. Counting the episodes that end first
+would favour short ones, which are successes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from rigid_env.terminal import Column, Table, make_console, run_program
 BATCH = 500  # episodes at a time
 
 FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the seed of the run
-SEED_STRIDE = 1_000_000  # episodes between the sets of seeds of two evaluations
+SEED_STRIDE = 1_000_000  # difference of the first seeds of two evaluations
 
 # --- options of the command lines -------------------------------------------------------------------------
 RUN_HELP = "Folder of a run; code in its model.zip runs while it is read: take it from those you trust only."
@@ -43,14 +43,15 @@ JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write
 
 @dataclass(frozen=True)
 class Episodes:
-    """Outcomes of episodes, one row each.
+    """Outcomes of n episodes.
 
     Parameters
     ----------
     success : (n,) bool
     returns : (n,) float64
+        Sum of the rewards of each episode.
     lengths : (n,) int64
-        Control steps.
+        Control steps of each episode.
     """
 
     success: np.ndarray
@@ -58,7 +59,7 @@ class Episodes:
     lengths: np.ndarray
 
     def summary(self) -> dict[str, Any]:
-        """Numbers for a table or JSON."""
+        """Numbers about the outcomes, as a dict for a table or JSON."""
         successes, count = int(self.success.sum()), len(self.success)
         low, high = wilson(successes, count)
         return {
@@ -75,25 +76,25 @@ class Episodes:
 
 
 def evaluation_seeds(seed: int, count: int) -> range:
-    """Seeds of the episodes of an evaluation; two evaluations, or training, share none of them."""
+    """Seeds of the `count` episodes of an evaluation; other values of `seed`, and training, have other seeds."""
     first = FIRST_SEED + SEED_STRIDE * seed
     return range(first, first + count)
 
 
 def run_episodes(env: str, policy: Policy, seeds: range, threads: int = 2, **arguments: Any) -> Episodes:
-    """One episode for each seed, from its reset to its end.
+    """Run one episode for each seed, from its reset to its end.
 
     Parameters
     ----------
     env : str
         Gymnasium id.
     policy : callable
-        Observations (n, entries) to actions (n, 6).
+        Function from observations (n, entries) to actions (n, 6).
     seeds : sequence of int
     threads : int
-        Of the engine.
+        Threads of the engine.
     **arguments
-        Of the environment.
+        Arguments of the environment.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def run_episodes(env: str, policy: Policy, seeds: range, threads: int = 2, **arg
 
 
 def _first_episodes(vector_env, policy: Policy, seeds: list[int]) -> Episodes:
-    """The first episode of every world; what a world does afterwards is not counted."""
+    """Run a batch until the first episode of every world has ended; later episodes are not counted."""
     count = len(seeds)
     success, is_running = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     returns, lengths = np.zeros(count), np.zeros(count, dtype=np.int64)
@@ -129,22 +130,24 @@ def _first_episodes(vector_env, policy: Policy, seeds: list[int]) -> Episodes:
 
 
 def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: Any) -> dict[str, Any]:
-    """Evaluate a policy on fresh seeded episodes.
+    """Evaluate a policy on fresh episodes with fixed seeds.
 
     Parameters
     ----------
     env : str
+        Gymnasium id.
     policy : callable
+        Function from observations (n, entries) to actions (n, 6).
     episodes : int
     seed : int
-        Of the set of episodes; the same set for every policy.
+        Seed of the set of episodes; every policy gets the same set.
     **arguments
-        Of the environment.
+        Arguments of the environment.
 
     Returns
     -------
     dict
-        The summary, with what was evaluated.
+        Summary of the episodes, with environment, arguments and seed.
 
     Raises
     ------
@@ -160,13 +163,13 @@ def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: An
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write numbers as JSON; a missing folder is made."""
+    """Write a dict as JSON; makes a missing folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 def make_table(result: dict[str, Any], title: str) -> Table:
-    """An evaluation as a table."""
+    """Table of an evaluation."""
     low, high = result["interval"]
     table = Table([Column("quantity", is_whole=True), "value"], title)
     table.add_row("environment", result["env"])
@@ -185,7 +188,7 @@ def print_evaluation(result: dict[str, Any], title: str, console: Console) -> No
 
 @dataclass(frozen=True)
 class Subject:
-    """Who is looked at, and where: a policy, and an environment with its arguments."""
+    """Policy to be evaluated or recorded, with its environment and the environment's arguments."""
 
     title: str
     policy: Policy
@@ -194,12 +197,12 @@ class Subject:
 
 
 def choose_subject(run: Path | None, baseline: str | None, env: str, seed: int, accuracy: str | None) -> Subject:
-    """Choose the subject of a command line: a run, or a baseline.
+    """Choose the subject of a command: the policy of a run, or a baseline.
 
     Raises
     ------
     ValueError
-        If it asks for both or none, or for something that does not exist.
+        If both or none are given, or a run or baseline does not exist.
     """
     if (run is None) == (baseline is None):
         raise ValueError("allowed is either the folder of a run or --baseline")

@@ -1,4 +1,4 @@
-"""Features of observations with goals: how far the goal is, coarsely and finely."""
+"""Features of observations with goals: difference between the desired and the achieved goal, linear and squashed."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import torch
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 
 FINE = 5.0
-"""Factor of the differences that are squashed: places are told in units of 5 m, so that these are in metres."""
+"""Factor of goal differences before tanh: positions are observed in units of 5 m, so the product is in metres."""
 
 
 class GoalDifference(BaseFeaturesExtractor):
-    """Observation and achieved goal, then the wanted goal minus the achieved one, as it is and squashed.
+    """Features extractor that appends the goal difference to the observation, linear and squashed by tanh.
 
-    A network that gets the two goals side by side has to learn to subtract numbers of the size of the room down to a
-    fraction of a tolerance. The squashed difference, tanh of `FINE` times it, is fine near the goal and flat far away.
+    The features are the observation, the achieved goal, and the desired minus the achieved goal in both forms. A
+    network with the two goals as inputs would have to learn to subtract numbers of the size of the room with a
+    precision of a fraction of the tolerance. The squashed difference, tanh of `FINE` times it, changes much near the
+    goal and little far away.
 
     Parameters
     ----------
@@ -27,7 +29,7 @@ class GoalDifference(BaseFeaturesExtractor):
         super().__init__(observation_space, size + 3 * goal)
 
     def forward(self, observations: dict[str, torch.Tensor]) -> torch.Tensor:
-        """(batch, features) from batches of the three parts."""
+        """Features (batch, features) of a batch of observations."""
         achieved = observations["achieved_goal"]
         way = observations["desired_goal"] - achieved
         return torch.cat((observations["observation"], achieved, way, torch.tanh(FINE * way)), dim=1)

@@ -1,4 +1,4 @@
-"""The packages that the commands of `agents` need, looked for before the first of them is imported."""
+"""Check for the packages that the commands of `agents` need, before the first of them is imported."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigid_env.extras import require
 
 
 def require_or_exit() -> None:
-    """End the program with one line, without a traceback, if a package of the extra ``agents`` is missing.
+    """End the program with one line of text, without a traceback, if a package of the extra ``agents`` is missing.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Plan without training: sample sequences of actions, roll them out on copies of the environment, keep what is good.
+"""Plan without training: sample sequences of actions, roll them out in copies of the environment, keep the best.
 
-``python -m agents.planner --env rigid_env/BlockReach-v0 --episodes 20`` solves episodes and tells how many, and how
-long one takes. Two ways to improve a plan: MPPI, which averages sequences by the exponential of their return, and the
-cross-entropy method, which fits a normal distribution to the best of them.
+``python -m agents.planner --env rigid_env/BlockReach-v0 --episodes 20`` plans episodes, and prints the success rate and
+the time of an episode. There are two methods to improve a plan. MPPI averages the sequences with weights exponential in
+their return. The cross-entropy method fits a normal distribution to the best sequences.
 
 References
 ----------
@@ -51,26 +51,26 @@ class PlannerSettings:
     ----------
     method : {"mppi", "cem"}
     samples : int
-        Sequences in one iteration, at least 2: one of them is the plan itself.
+        Sequences in one iteration, at least 2; one of them is the plan itself.
     horizon : int
         Control steps of a sequence.
     knots : int
-        Actions of a sequence that are drawn; those between are interpolated.
+        Number of actions of a sequence that are drawn; the others are interpolated.
     iterations : int
-        Improvements of a plan in one control step.
+        Improvements of the plan each time that it is made.
     noise : float
-        Standard deviation of what is added to knots.
+        Standard deviation of the noise that is added to knots.
     temperature : float
-        MPPI: difference of returns over which a weight falls by e, in standard deviations of the returns.
+        MPPI: difference of returns for which a weight decreases by the factor e, in standard deviations of the returns.
     elites : int
-        Cross-entropy method: sequences that the distribution is fitted to.
+        Cross-entropy method: number of best sequences that the distribution is fitted to.
     replan : int
-        Control steps that are taken of a plan before the next one.
+        Control steps that are taken of a plan before the next one is made.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     method: str = "mppi"
@@ -99,20 +99,21 @@ class PlannerSettings:
 
 
 class Planner:
-    """Plan actions of a task by rolling out samples.
+    """Planner of actions for a task, by rollouts of random sequences in a model.
 
-    The model knows the state and the draws of the episode, and no random number to come: pushes and gusts that it meets
-    come from generators of its own, and so does the time of the next one. A gust that blows is known up to its end. All
-    sequences of an iteration meet the same ones, so that their returns differ by their actions alone.
+    The model knows the state and the drawn values of the episode, but no future random number. Pushes and gusts in it,
+    and the time of the next one, come from its own generators; a current gust is known up to its end. All sequences of
+    an iteration get the same disturbances, so that their returns differ only by their actions.
 
     Parameters
     ----------
     task : class of Task, or str
+        Task of the model.
     settings : PlannerSettings
     seed : int
+        Seed of the sequences.
     **of_task
-        Arguments of the task, such as ``accuracy`` and ``threads``: those of the model, which may be coarser than the
-        environment.
+        Arguments of the model's task, such as ``accuracy`` and ``threads``; it may be coarser than the environment.
     """
 
     def __init__(self, task, settings: PlannerSettings | None = None, seed: int = 0, **of_task):
@@ -123,17 +124,17 @@ class Planner:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the last plan: another episode begins."""
+        """Forget the last plan, since another episode begins."""
         self._mean = np.zeros((self.settings.knots, self.model.action_size))
         self._spread = np.full_like(self._mean, self.settings.noise)
 
     def plan(self, state: TaskState) -> np.ndarray:
-        """Improve the plan from a state, and give its next actions.
+        """Improve the plan from a state, and return its next actions.
 
         Parameters
         ----------
         state : TaskState
-            Of one world; `get_state` of an environment.
+            State of one world, from `get_state` of an environment.
 
         Returns
         -------
@@ -142,7 +143,7 @@ class Planner:
         Raises
         ------
         ValueError
-            It is no state, one of several worlds, or one of another task or of other settings.
+            An object that is no state, a state of several worlds, of another task or of other settings.
         """
         validation.instance(state, TaskState, "state", "what get_state of an environment gives")
         if state.worlds != 1:
@@ -150,7 +151,7 @@ class Planner:
         s = self.settings
         for _ in range(s.iterations):
             noise = self._rng.standard_normal((s.samples, s.knots, self.model.action_size))
-            noise[0] = 0.0  # the plan itself is among them
+            noise[0] = 0.0  # the first sample is the plan itself
             knots = np.clip(self._mean + self._spread * noise, -1.0, 1.0)
             returns = self.returns(state, np.einsum("tk,nka->nta", self._weights, knots))
             self._improve(knots, returns)
@@ -159,10 +160,10 @@ class Planner:
         return actions[: s.replan]
 
     def returns(self, state: TaskState, actions: np.ndarray) -> np.ndarray:
-        """Returns of sequences of actions (samples, horizon, numbers), each up to the end of its episode."""
+        """Returns (samples,) of sequences of actions (samples, horizon, numbers), each up to the end of its episode."""
         is_disturbed = self.model.disturbed is not None
         own = np.random.PCG64(self._rng.integers(2**63)).state if is_disturbed else None
-        state = replace(state, generators=(own,) * state.worlds)  # those of the environment would foretell its pushes
+        state = replace(state, generators=(own,) * state.worlds)  # the environment's own would reveal future pushes
         if not is_disturbed:
             return rollout(self.model, actions, initial=state).returns
         reinstate(self.model, {}, state)
@@ -180,7 +181,7 @@ class Planner:
         self._mean = np.einsum("n,nka->ka", weights / weights.sum(), knots)
 
     def _shift(self) -> None:
-        """Move the plan on by the control steps that are taken of it."""
+        """Move the plan ahead: drop the `replan` control steps that are executed now, and repeat the last one."""
         s = self.settings
         times = np.linspace(0, s.horizon - 1, s.knots) + s.replan
         plan = self._weights @ self._mean
@@ -191,14 +192,14 @@ class Planner:
 
 
 def _interpolation(knots: int, horizon: int) -> np.ndarray:
-    """(horizon, knots) weights of linear interpolation."""
+    """Weights (horizon, knots) of linear interpolation from knots to control steps."""
     times = np.linspace(0.0, knots - 1.0, horizon)
     return np.maximum(0.0, 1.0 - np.abs(times[:, None] - np.arange(knots)))
 
 
 @dataclass(frozen=True)
 class Solved:
-    """Outcome of planned episodes.
+    """Outcomes of planned episodes.
 
     Attributes
     ----------
@@ -214,7 +215,7 @@ class Solved:
     seconds: list[float]
 
     def add(self, others: Solved) -> None:
-        """Take in episodes that were planned later."""
+        """Append the outcomes of further episodes."""
         self.is_success.extend(others.is_success)
         self.steps.extend(others.steps)
         self.seconds.extend(others.seconds)
@@ -226,11 +227,11 @@ def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0) -> Solve
     Parameters
     ----------
     env : gymnasium.Env
-        Of this package; the planner's model is of its task.
+        Environment of this package, with the task of the planner's model.
     planner : Planner
     episodes : int
     seed : int
-        Of the first episode; the others follow it.
+        Seed of the first episode; each further one adds 1.
     """
     found = Solved([], [], [])
     for episode in range(episodes):

@@ -1,4 +1,4 @@
-"""Progress of a training run: a bar, or a line now and then where there is no terminal."""
+"""Progress of a training run: a bar in a terminal, or else a line of text every few seconds."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from agents.curve import CurvePoint
 
-LINE_EVERY = 10.0  # between two lines where there is no terminal [s]
-BAR_WIDTH = 12  # of steps over their limit; all of the line goes into 80 columns
+LINE_EVERY = 10.0  # time between two lines without a terminal [s]
+BAR_WIDTH = 12  # width of the bar, so that the whole line fits into 80 columns [characters]
 RATE_OVER = 5.0  # time over which the speed is averaged [s]
 
 
 class ProgressDisplay:
-    """Steps, success rate, return and speed of a run.
+    """Display of steps, success rate, return and speed of a run.
 
     Parameters
     ----------
     console : rich.console.Console
     max_steps : int
+        Steps at which the bar is full.
     """
 
     def __init__(self, console: Console, max_steps: int):
@@ -47,7 +48,7 @@ class ProgressDisplay:
         self._bar.stop()
 
     def update(self, point: CurvePoint) -> None:
-        """Show where the run stands."""
+        """Show the numbers of a point of the learning curve."""
         now = time.perf_counter()
         self._measure_rate(point.steps, now)
         rate = "   ..." if math.isnan(self._rate) else f"{self._rate:6,.0f}"

@@ -25,8 +25,8 @@ from agents.evaluate import (
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_camera
 from rigid_env.terminal import make_console, run_program
 
-SIZE = (640, 400)  # width and height of the picture [px]; even, as the video's colour format asks
-PAUSE = 0.5  # the last picture of an episode is shown so long [s]
+SIZE = (640, 400)  # width and height of the picture [px]; even numbers, which the video's colour format requires
+PAUSE = 0.5  # time for which the last picture of an episode is shown [s]
 GIF_STEP = 2  # every second picture: a GIF counts in hundredths of a second and gets large
 
 
@@ -38,17 +38,17 @@ def record(env: str, policy: Policy, seeds: range, path: Path, **arguments: Any)
     env : str
         Gymnasium id.
     policy : callable
-        Observations (n, entries) to actions (n, 6).
+        Function from observations (n, entries) to actions (n, 6).
     seeds : sequence of int
     path : Path
-        With the suffix ``.mp4`` or ``.gif``. Without ffmpeg, ``.mp4`` becomes ``.gif``.
+        File with the suffix ``.mp4`` or ``.gif``. Without ffmpeg, ``.mp4`` becomes ``.gif``.
     **arguments
-        Of the environment, ``camera`` and ``arrows`` of its pictures among them.
+        Arguments of the environment, such as ``camera`` and ``arrows`` of its pictures.
 
     Returns
     -------
     Path
-        Of the file written.
+        Path of the file.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def record(env: str, policy: Policy, seeds: range, path: Path, **arguments: Any)
 
 
 def _pictures(single: gym.Env, policy: Policy, seeds: range, pause: int) -> Iterator[np.ndarray]:
-    """Pictures (height, width, 3) uint8 of all episodes, one after the other."""
+    """Yield pictures (height, width, 3) uint8 of all episodes; the last one of each is repeated `pause` times."""
     for seed in seeds:
         observation, _ = single.reset(seed=seed)
         has_ended = False

@@ -1,4 +1,4 @@
-"""A whole run: training, evaluation and video, begun or gone on with wherever it was ended."""
+"""Whole run: training, evaluation and video, started or continued from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ VIDEO_EPISODES = 3
 
 
 def finish(config: RunConfig, run: RunFolder, policy, with_video: bool, console: Console) -> dict[str, Any]:
-    """Evaluate a trained policy and record a video; writes both into the folder of the run.
+    """Evaluate a trained policy and record a video; both are written into the folder of the run.
 
     Returns
     -------
@@ -50,13 +50,13 @@ def run_or_resume(
     on_checkpoint: OnCheckpoint | None = None,
     console: Console | None = None,
 ) -> dict[str, Any]:
-    """Train and evaluate: begin a run, go on with one wherever it was ended, or read the result of a complete one.
+    """Train and evaluate: start a run, continue one from its last checkpoint, or read the result of a complete one.
 
     Parameters
     ----------
     config : RunConfig
     folder : path
-        Of the run; made if it is not there.
+        Folder of the run; made if it does not exist.
     with_video, with_tensorboard : bool
         Record some episodes at the end; write diagnostics.
     on_checkpoint : callable, optional
@@ -66,16 +66,16 @@ def run_or_resume(
     Returns
     -------
     dict
-        What `result.json` holds.
+        Contents of `result.json`.
 
     Raises
     ------
     Interrupted
-        On Ctrl-C: the next call goes on.
+        On Ctrl-C; the next call continues the run.
     RunInUse
         If another process works on the run.
     ValueError
-        If its folder is that of a run with other settings, or the algorithm or the environment refuses an argument.
+        If the folder has a run with other settings, or the algorithm or the environment refuses an argument.
     """
     start, run, console = time.perf_counter(), RunFolder(Path(folder)), console or make_console()
     with run.locked():
@@ -102,7 +102,7 @@ def run_or_resume(
 
 
 def read_result(run: RunFolder, config: RunConfig) -> dict[str, Any] | None:
-    """The result of a run that is complete; None where steps, or a higher target, are left."""
+    """Read the result of a run that is complete; None if steps, or a higher target, are left."""
     if not run.result.is_file():
         return None
     result = json.loads(run.result.read_text(encoding="utf-8"))
@@ -111,7 +111,7 @@ def read_result(run: RunFolder, config: RunConfig) -> dict[str, Any] | None:
 
 
 def check_same(run: RunFolder, config: RunConfig) -> None:
-    """Refuse to go on with a run as another one.
+    """Refuse to continue a run with a different configuration.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def check_same(run: RunFolder, config: RunConfig) -> None:
 
 
 def _difference(name: str, ours: Any, theirs: Any) -> tuple[str, Any, Any]:
-    """Dotted name of the first entry that differs, and both values."""
+    """Dotted name of the first entry that differs between two values of a field, and both values of this entry."""
     if isinstance(ours, dict) and isinstance(theirs, dict):
         for key in (*ours, *theirs):
             if ours.get(key) != theirs.get(key):

@@ -1,4 +1,4 @@
-"""Settings by their dotted names, as the command line gives them: ``algorithm.learning_rate=3e-4``."""
+"""Settings by dotted names, as the command line gives them: ``algorithm.learning_rate=3e-4``."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from agents.config import RunConfig
 from physics.keywords import nearest_first
 
 OF_OPTIONS = {"env": "to name the environment alone", "algo": "--algo", "seed": "--seed, or --seeds of a sweep"}
-"""Fields that decide which hyperparameters a run starts from, and its name: options have them."""
+"""Fields that have options of their own, because they decide the hyperparameters and the name of a run."""
 
 OPEN_FIELDS = ("algorithm", "env_kwargs")  # of a `RunConfig`: dicts with entries of any name
 
 
 def parse_settings(assignments: Sequence[str]) -> dict[str, Any]:
-    """Values by dotted name, of texts such as ``algorithm.learning_rate=3e-4``; a value is YAML.
+    """Parse texts such as ``algorithm.learning_rate=3e-4`` to values by dotted name; a value is YAML.
 
     Raises
     ------
     ValueError
-        If a text is none of these, or a name occurs twice.
+        If a text has another form, or a name occurs twice.
     """
     found: dict[str, Any] = {}
     for text in assignments:
@@ -37,12 +37,12 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, Any]:
 
 
 def parse_value(text: str, name: str) -> Any:
-    """A number, text, list or dict from YAML; 3e-4 is a number, too.
+    """Parse a number, text, list or dict from YAML; 3e-4 is a number, too. `name` is the setting's, for errors.
 
     Raises
     ------
     ValueError
-        If it is no YAML.
+        If the text is no YAML.
     """
     try:
         return _with_numbers(yaml.safe_load(text))
@@ -51,7 +51,7 @@ def parse_value(text: str, name: str) -> Any:
 
 
 def _with_numbers(value: Any) -> Any:
-    """Replace texts that are numbers: YAML 1.1 reads 3e-4, without a point, as text."""
+    """Replace texts that are numbers; YAML 1.1 reads 3e-4, which has no decimal point, as text."""
     if isinstance(value, list):
         return [_with_numbers(each) for each in value]
     if isinstance(value, dict):
@@ -65,7 +65,9 @@ def _with_numbers(value: Any) -> Any:
 
 
 def apply_settings(config: RunConfig, settings: Mapping[str, Any]) -> RunConfig:
-    """The same configuration with other values of what dotted names say; anything in ``config.yaml`` has one.
+    """Copy of a configuration with other values of some settings, given by dotted names.
+
+    Every value in ``config.yaml`` has such a name.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def apply_settings(config: RunConfig, settings: Mapping[str, Any]) -> RunConfig:
 
 
 def _with_entry(table: Any, path: list[str], value: Any, name: str) -> dict[str, Any]:
-    """A copy of nested dicts with another value at `path`."""
+    """Copy of nested dicts with another value at `path`, the keys from the outermost dict on."""
     if not isinstance(table, dict) or not path[0]:
         raise ValueError(f"{name} is {value!r}; allowed are entries of {', '.join(OPEN_FIELDS)} and of dicts in them")
     first, *rest = path

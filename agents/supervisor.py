@@ -1,4 +1,4 @@
-"""Supervisor of training: counts episodes, draws the curve, writes checkpoints, stops at the target."""
+"""Supervisor of training: counts episodes, records the learning curve, writes checkpoints, stops at the target."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from agents.curve import WINDOW, CurvePoint, History, write_curve
 from agents.evaluate import SEED_STRIDE, evaluation_seeds, run_episodes
 from agents.progress import ProgressDisplay
 
-POINT_EVERY = 0.5  # between two points of the curve [s]
-CHECKPOINT_EVERY = 10.0  # of training; what an interruption costs at most [s] ...
-CHECKPOINT_SHARE = 0.05  # ... or longer, so that writing them, with a large replay buffer, takes this share at most
+POINT_EVERY = 0.5  # time between two points of the curve [s]
+CHECKPOINT_EVERY = 10.0  # least time of training between two checkpoints [s]
+CHECKPOINT_SHARE = 0.05  # largest share of the time for writing checkpoints; with a large replay buffer they are rarer
 
-CONFIRMATION_EPISODES = 500  # of the deterministic policy on fresh seeds, before training may end
-CONFIRMATION_PAUSE = 2000  # episodes of training after a confirmation that failed
-CONFIRMATION_SEEDS = SEED_STRIDE // 2  # apart from those of the final evaluation
+CONFIRMATION_EPISODES = 500  # episodes of the deterministic policy on fresh seeds, before training may end
+CONFIRMATION_PAUSE = 2000  # least episodes of training after a confirmation that failed
+CONFIRMATION_SEEDS = SEED_STRIDE // 2  # index of the first seed, so that none is used in the final evaluation
 
 OnCheckpoint = Callable[[Path, CurvePoint], None]
 
 
 class Supervisor(BaseCallback):
-    """Callback of a run.
+    """Callback of Stable-Baselines3 that supervises a run.
 
-    The target is reached when the success rate of the last `WINDOW` episodes of training is at least the
-    target, and that of `CONFIRMATION_EPISODES` episodes of the deterministic policy is, too.
+    The target is reached when two success rates are at least the target: that of the last `WINDOW` episodes of
+    training, and that of `CONFIRMATION_EPISODES` episodes of the deterministic policy.
 
     Parameters
     ----------
     config : RunConfig
     run : RunFolder
     history : History
-        Continued.
+        Record of the run so far, which is continued.
     display : ProgressDisplay
     on_checkpoint : callable, optional
         Called with the folder of each checkpoint and the last `CurvePoint`; an exception that it raises ends training.
@@ -66,7 +66,7 @@ class Supervisor(BaseCallback):
         self._open_monitor()
 
     def close(self) -> None:
-        """Close the monitor file, however training ended: rows that wait would be written into a resumed run's."""
+        """Close the monitor file after training; buffered rows could otherwise get into a resumed run's file."""
         self._monitor.close()
 
     # --- calls of Stable-Baselines3 -----------------------------------------------------------------------
@@ -77,7 +77,11 @@ class Supervisor(BaseCallback):
             self.model.action_noise = self.history.noise
 
     def _on_rollout_start(self) -> None:
-        """Between two updates: the only moment at which all of the run is in a state to be kept."""
+        """Add a point to the curve and write a checkpoint, if they are due.
+
+        Stable-Baselines3 calls it between two updates of the policy, the only moment at which a run can be saved
+        completely.
+        """
         self.history.seconds = time.perf_counter() - self._start
         self.is_target_reached = self._is_confirmed()
         if self.is_target_reached:
@@ -104,19 +108,19 @@ class Supervisor(BaseCallback):
             self._add_point()
             self._checkpoint()
 
-    # --- parts of these -----------------------------------------------------------------------------------
+    # --- parts of the methods above -----------------------------------------------------------------------
 
     def _add_point(self) -> None:
         point = self.history.point(self.num_timesteps)
         points = self.history.points
-        if points and points[-1].steps == point.steps:  # a resumed run begins where it was kept
+        if points and points[-1].steps == point.steps:  # a resumed run starts at the step of its last point
             points.pop()
         points.append(point)
         self.display.update(point)
         self._last_point = self.history.seconds
 
     def _is_confirmed(self) -> bool:
-        """True if the target is reached, by the last episodes and then by an evaluation."""
+        """True if the target is reached, first by the last episodes of training and then by an evaluation."""
         history = self.history
         if len(history.window) < WINDOW or history.episodes < history.next_confirmation:
             return False
@@ -154,7 +158,7 @@ class Supervisor(BaseCallback):
         self._checkpoint_every = max(CHECKPOINT_EVERY, (time.perf_counter() - start) / CHECKPOINT_SHARE)
 
     def _open_monitor(self) -> None:
-        """Open the monitor file, in the format of SB3's `Monitor`; resuming cuts it at the checkpoint."""
+        """Open the monitor file, in the format of SB3's `Monitor`; a resumed run cuts it to its size at that time."""
         is_new = self.history.monitor_size == 0
         self._monitor = self.run_folder.monitor.open("w" if is_new else "r+", newline="", encoding="utf-8")
         self._rows = csv.writer(self._monitor, lineterminator="\n")

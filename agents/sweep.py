@@ -29,11 +29,12 @@ INTERRUPTED = 130
 
 
 def check_arguments(trials: Sequence[Trial]) -> None:
-    """Refuse arguments of algorithms and environments that the first step of a trial would refuse.
+    """Refuse arguments of algorithms and environments that would fail at the first step of a trial.
 
     Raises
     ------
     ValueError
+        Naming the argument.
     """
     seen = []
     for trial in trials:
@@ -46,7 +47,7 @@ def check_arguments(trials: Sequence[Trial]) -> None:
 
 
 def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
-    """Results of the complete trials, by name."""
+    """Results of the trials that are complete, by name."""
     found = {trial.name: read_result(RunFolder(out / trial.name), trial.config) for trial in trials}
     return {name: result for name, result in found.items() if result is not None}
 
@@ -54,12 +55,12 @@ def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
 def sweep(
     trials: Sequence[Trial], out: Path, launch: Launch, jobs: int, address: str | None, console: Console
 ) -> list[Ended]:
-    """Run the trials that are not complete; a line tells each that ends.
+    """Run the trials that are not complete, and print a line for each that ends.
 
     Returns
     -------
     list of Ended
-        One for each that is complete or has failed, in the order of the trials.
+        Ends of the trials that are complete or have failed, in the order of the trials.
     """
     ended = {name: Ended(name, result) for name, result in complete(trials, out).items()}
     left = [trial for trial in trials if trial.name not in ended]
@@ -84,7 +85,7 @@ def _told(end: Ended) -> str:
 
 
 def make_table(ends: Sequence[Ended]) -> Table:
-    """Success of each trial on fresh episodes."""
+    """Table of the success of each trial on fresh episodes."""
     table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
     for name, result, _ in ends:
         if result is None:

@@ -8,8 +8,8 @@ reached, and leaves in its folder:
 - ``evaluation.json`` (1,000 fresh seeded episodes without exploration) and ``result.json``,
 - ``episodes.mp4``, a video.
 
-Ctrl-C ends it at its last checkpoint, from which ``--resume FOLDER`` goes on with the same bits. `run_or_resume` does
-all of this for programs: it begins a run, goes on with it wherever it was ended, or returns its result.
+Ctrl-C ends it at its last checkpoint, from which ``--resume FOLDER`` continues with the same bits. `run_or_resume` does
+all of this for programs: it starts a run, continues it from its last checkpoint, or returns its result.
 """
 
 from __future__ import annotations
@@ -36,21 +36,20 @@ INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
 
 
 def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, Any]) -> RunConfig:
-    """The configuration of a new run, or of the one to go on with.
+    """Choose the configuration of a new run, or of the run to be continued.
 
     Parameters
     ----------
     resume : Path or None
-        Folder of the run to go on with.
+        Folder of the run to be continued; None: a new run.
     hyperparameters : Path
     fixed : dict
-        ``env``, ``algo``, ``seed``, ``num_envs``, ``accuracy``: None where nothing else than the default is
-        wanted.
+        ``env``, ``algo``, ``seed``, ``num_envs``, ``accuracy`` as given; None stands for the default.
 
     Raises
     ------
     ValueError
-        On values out of range, and where a run is to go on as another one.
+        On values out of range, and if a value is given for a run to be continued.
     """
     given = {name: value for name, value in fixed.items() if value is not None}
     if resume is None:

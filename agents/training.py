@@ -1,4 +1,4 @@
-"""Training of a model until its target or its limit, with checkpoints."""
+"""Training of a model until its target or its limit of steps, with checkpoints."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rigid_env.terminal import make_console
 
 
 class Interrupted(Exception):
-    """Training was ended by Ctrl-C; the message says how to go on."""
+    """Training was ended by Ctrl-C; the message says how to continue."""
 
 
 def train(
@@ -31,16 +31,16 @@ def train(
     on_checkpoint: OnCheckpoint | None = None,
     console: Console | None = None,
 ) -> dict[str, Any]:
-    """Train until the target or the limit is reached; writes configuration, model, checkpoints and curve.
+    """Train until the target or the limit of steps is reached; writes configuration, model, checkpoints and curve.
 
-    A run that goes on, and has reached one of them, is not trained further.
+    A resumed run that has reached one of them already is not trained further.
 
     Parameters
     ----------
     config : RunConfig
     run : RunFolder
     is_resumed : bool
-        Go on from the newest checkpoint in `run`.
+        Continue from the newest checkpoint in `run`.
     with_tensorboard : bool
         Write Stable-Baselines3's diagnostics for TensorBoard, too.
     on_checkpoint : callable, optional
@@ -50,7 +50,8 @@ def train(
     Returns
     -------
     dict
-        Steps, seconds, whether the target was reached, and where the last episodes of training stood.
+        Steps, seconds, whether the target was reached, success rate and mean return of the last episodes of training,
+        and the policy.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def _learn(
     config: RunConfig, run: RunFolder, model: BaseAlgorithm, history: History, is_resumed: bool,
     on_checkpoint: OnCheckpoint | None, console: Console,
 ) -> None:  # fmt: skip
-    """Let a model learn; the curve is drawn however that ends."""
+    """Let a model learn; the curve is drawn even if an exception ends it."""
     with ProgressDisplay(console, config.max_steps) as display:
         supervisor = Supervisor(config, run, history, display, on_checkpoint)
         try:
@@ -106,12 +107,12 @@ def _learn(
 
 
 def _logger(run: RunFolder, with_tensorboard: bool) -> Logger:
-    """Logger of Stable-Baselines3; its own default leaves an empty folder in that of temporary files."""
+    """Make a logger of Stable-Baselines3; its default logger would leave an empty folder among the temporary files."""
     return configure(str(run.path / "tensorboard"), ["tensorboard"]) if with_tensorboard else Logger(None, [])
 
 
 def interruption_message(run: RunFolder, step: int) -> str:
-    """Say what an interrupted run has left, and how to go on."""
+    """Text that says at which step a run was interrupted, and how to continue it."""
     kept = list_checkpoints(run.checkpoints)
     if not kept:
         return f"Interrupted before the first checkpoint; {run.path} holds nothing to go on from."

@@ -1,4 +1,4 @@
-"""Trials of a sweep: one run for each environment, seed and combination of settings, named by what is set."""
+"""Trials of a sweep: one run for each environment, seed and combination of settings, named by its settings."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ import yaml
 from agents.config import HYPERPARAMETERS, RunConfig, default_algorithm, make_config
 from agents.settings import apply_settings, parse_value
 
-# A process to itself: many of them share a machine.
+# One thread per trial, since many trials share a machine.
 THREADS = {"threads": 1, "torch_threads": 1}
 
-# Characters of a value in the name of a folder; what has others, or is longer, is named by its digest.
+# Values that may stand in the name of a folder; other values, and longer ones, are replaced by a digest.
 _PLAIN = re.compile(r"[\w.+-]{1,24}")
 
 
@@ -30,11 +30,12 @@ class Trial:
     Parameters
     ----------
     name : str
-        Of its folder; the same settings have the same name at any time and place.
+        Name of its folder; the same settings have the same name at any time and place.
     config : RunConfig
     settings : dict
-        What differs from the hyperparameters, by dotted name.
+        Values that replace hyperparameters, by dotted name.
     hyperparameters : Path
+        File of hyperparameters.
     """
 
     name: str
@@ -43,7 +44,7 @@ class Trial:
     hyperparameters: Path = HYPERPARAMETERS
 
     def command(self, out: Path) -> str:
-        """A line for a shell that runs the trial, or goes on with it."""
+        """Shell command that runs the trial in a folder below `out`, or continues it."""
         words = ["python", "-m", "agents.train", "--folder", str(out / self.name), "--no-video",
                  "--env", self.config.env, "--algo", self.config.algo, "--seed", str(self.config.seed)]  # fmt: skip
         for name, value in self.settings.items():
@@ -61,7 +62,7 @@ def make_trials(
     algo: str | None = None,
     hyperparameters: Path = HYPERPARAMETERS,
 ) -> list[Trial]:
-    """Every combination of environments, settings and seeds, in this order.
+    """Make a trial for every combination of environments, settings and seeds, in this order.
 
     Parameters
     ----------
@@ -71,13 +72,13 @@ def make_trials(
     grid : mapping of str to sequence
         Values of each setting, by dotted name (`agents.settings`).
     algo : str, optional
-        None: the first of each environment.
+        None: the first algorithm of each environment in the file.
     hyperparameters : Path
 
     Raises
     ------
     ValueError
-        If a setting is none, or two trials would be the same.
+        If there is no such setting, or two trials would be the same.
     """
     trials = {}
     for env, values, seed in product(envs, product(*grid.values()), seeds):
@@ -104,12 +105,12 @@ def _label(value: Any) -> str:
 
 
 def parse_grid(assignments: Iterable[str]) -> dict[str, list[Any]]:
-    """Values of each setting, of texts such as ``algorithm.learning_rate=1e-3,3e-4``.
+    """Parse texts such as ``algorithm.learning_rate=1e-3,3e-4`` to lists of values, by dotted name.
 
     Raises
     ------
     ValueError
-        If a text is none of these, or a name occurs twice.
+        If a text has another form, or a name occurs twice.
     """
     grid: dict[str, list[Any]] = {}
     for text in assignments:

@@ -1,7 +1,7 @@
-"""Gymnasium environments on the `physics` engine: a block to be pushed, tipped and turned among three walls.
+"""Gymnasium environments on the engine `physics`: a block is pushed, tipped and turned among three walls.
 
 Importing the package registers `rigid_env/BlockReach-v0`, `rigid_env/BlockReorient-v0` and `rigid_env/Scene-v0`, the
-environment of a scene file; the engine is imported with the first environment.
+environment of a scene file. The engine is imported when the first environment is made.
 """
 
 from importlib import import_module
@@ -136,7 +136,7 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    """The version of the distribution; of sources that are not installed ``0+unknown``."""
+    """Version of the installed distribution, or ``0+unknown`` if only the sources are there."""
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -1,4 +1,4 @@
-"""``python -m rigid_env``: the command line."""
+"""Program ``python -m rigid_env``: the command line ``rigid-env``."""
 
 from rigid_env.cli import app
 

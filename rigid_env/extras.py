@@ -1,7 +1,7 @@
-"""Optional dependencies: report the missing package of an extra, and the line that installs it.
+"""Optional dependencies: find missing packages of an extra, and the command that installs them.
 
-A command that cannot do without calls `require` before anything runs. One that has more to give than a picture asks
-`lacking`, and ends with that line. Nothing is imported to find out.
+A command that needs the packages calls `require` before anything runs. A command whose picture alone needs them calls
+`lacking`, and prints the message at its end. Both find packages without importing them.
 """
 
 from __future__ import annotations
@@ -29,19 +29,18 @@ EXTRAS: dict[str, dict[str, str]] = {
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
-"""Modules of each extra of `pyproject.toml` that are imported, with the names by which users know them.
+"""Modules of each extra of `pyproject.toml`, with the names by which users know them.
 
-The extra `agents` brings tensorboard, moviepy and imageio-ffmpeg as well: name them where one is needed.
-"""
+The extra `agents` also installs tensorboard, moviepy and imageio-ffmpeg: name these modules where they are needed."""
 
 CPU_TORCH = "--index-url https://download.pytorch.org/whl/cpu"
-"""Option of pip that finds torch for the processor alone; without it pip on Linux installs CUDA, too."""
+"""Option of pip for the build of torch that runs on the processor only; without it pip on Linux installs CUDA, too."""
 
 SOURCES = Path(__file__).parents[1]
 
 
 def require(extra: str, *modules: str, purpose: str = "this command") -> None:
-    """Raise if modules of an extra are not installed.
+    """Raise an error if modules of an extra are not installed.
 
     Parameters
     ----------
@@ -49,21 +48,21 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str
-        The subject of the message: "a plot", "training an agent".
+        Subject of the message: "a plot", "training an agent".
 
     Raises
     ------
     gymnasium.error.DependencyNotInstalled
-        Naming the missing packages and the line that installs them.
+        Naming the missing packages and the command that installs them.
     """
     if told := lacking(extra, *modules, purpose=purpose):
         raise DependencyNotInstalled(told)
 
 
 def lacking(extra: str, *modules: str, purpose: str) -> str:
-    """Names of an extra's missing modules and the line that installs them; "" if none is missing.
+    """Message with an extra's missing packages and the command that installs them; "" if none is missing.
 
-    Arguments as of `require`, which raises instead.
+    Arguments as of `require`, which raises this message as an error.
     """
     names = [EXTRAS[extra].get(module, module) for module in modules or EXTRAS[extra] if not is_installed(module)]
     if not names:
@@ -80,15 +79,15 @@ def is_installed(module: str) -> bool:
         return find_spec(module) is not None
     except ImportError:
         return False
-    except ValueError:  # in sys.modules without a spec: it is there
+    except ValueError:  # it is in sys.modules without a spec, so it is installed
         return True
 
 
 def install_line(extra: str, has_torch: bool = True) -> str:
-    """Command that installs an extra; in a checkout of the sources it installs these as editable, too.
+    """Command that installs an extra; in a checkout of the sources also the command that installs it from there.
 
-    If torch is missing, a second line follows, which installs the small torch of the same versions. It must be run
-    first.
+    If torch is missing (`has_torch` is False), a further command follows, to be run first: it installs the small build
+    of torch without CUDA.
     """
     line, torch = f'pip install "rigid-env[{extra}]"', f"pip install torch {CPU_TORCH}"
     if (SOURCES / "pyproject.toml").is_file() and (SOURCES / "constraints.txt").is_file():

@@ -1,7 +1,7 @@
-"""Detect another file in place of the engine `physics`, at the import of this package, and print a remedy.
+"""Detect another module named `physics` in place of the engine, when this package is imported.
 
-Python looks for `physics` in the working folder first (``python -m``, ``python -c``) or in the folder of the script. A
-`physics.py` there, or another distribution of that name, hides the engine. Nothing is imported to find out.
+Python looks for `physics` first in the working folder (``python -m``, ``python -c``) or in the folder of the script. A
+`physics.py` there, or another distribution of that name, hides the engine. The engine is not imported for the check.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 
 ENGINE, MARK, IMPORTED = "physics", "kernels", "physics.world.world"
-"""Package to find, a subpackage that only the engine has, and a module that its first file imports. Another
-distribution installed into the same folder overwrites that file alone."""
+"""Name of the engine's package, a subpackage that only the engine has, and a module that its ``__init__.py`` imports.
+Another distribution installed into the same folder overwrites that file alone."""
 
 
 def check_engine_is_found() -> None:
-    """Raise an error if ``import physics`` gives, or has given, a module other than the engine.
+    """Raise an error if ``import physics`` would give, or has given, a module other than the engine.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def _message(spec: ModuleSpec) -> str:
 
 
 def _distribution_of(path: str) -> str | None:
-    """Name of the distribution that installed a file of the engine's name."""
+    """Name of the other distribution that installed the file `path` as `physics`; None if no distribution did."""
     from importlib.metadata import packages_distributions
     from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The command line ``rigid-env``. Each command imports its packages when it runs, so ``--help`` is quick."""
+"""Command line ``rigid-env``. Each command imports its packages when it runs, so that ``--help`` is quick."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options of commands that draw: eye and target of the camera, and whether arrows are drawn."""
+"""Options of commands that draw: position and target of the camera, and whether arrows are drawn."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ ArrowsOption = Annotated[
 
 
 def checked_camera(eye: Point | None, target: Point | None) -> Camera | None:
-    """Camera that the options describe, or None without an eye; y is up, or -z if it looks straight up or down.
+    """Make the camera that the options describe; None without an eye. Up is y, or -z for a view along y.
 
     Parameters
     ----------
     eye : (3,) float or None
-        [m], world frame.
+        Position of the camera, world frame [m].
     target : (3,) float or None
-        [m], world frame; None: the origin.
+        Point in the middle of the picture, world frame [m]; None: the origin.
 
     Raises
     ------
     typer.BadParameter
-        A target without an eye, numbers that are not finite, or two equal places.
+        A target without an eye, numbers that are not finite, or equal points.
     """
     from rigid_env.rendering.camera_argument import as_camera, upwards
 
@@ -52,7 +52,7 @@ def checked_camera(eye: Point | None, target: Point | None) -> Camera | None:
 
 
 def checked_shot(eye: Point | None, target: Point | None, arrows: bool) -> Shot:
-    """View of a motion from the options; without a target the camera looks at the middle of the motion.
+    """Make the `Shot` that the options describe; without a target the camera looks at the middle of the motion.
 
     Raises
     ------

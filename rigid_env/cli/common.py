@@ -1,4 +1,4 @@
-"""Parts of every command: the application, options, errors as messages, files."""
+"""Parts that all commands share: the application, options, error messages, written files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rigid_env.cli.files import output_option
 
 INTERRUPTED = 130  # exit status after Ctrl-C, as a shell gives it
 
-# Without markup: square brackets in a help text are printed, and an error is one line that is never framed or broken.
+# No markup: square brackets in a help text are printed, and an error is one line without a frame or a break.
 app = typer.Typer(
     no_args_is_help=True,
     help="A rigid-body engine you can check.",
@@ -45,7 +45,7 @@ SceneArgument = Annotated[
 
 
 def at_least(least: int):
-    """Make a check of a least number, for an option's `callback`; the error names the value and the allowed ones."""
+    """Make a function that refuses numbers below `least`, for the `callback` of an option."""
 
     def check(value: float) -> float:
         if not value >= least:
@@ -57,7 +57,10 @@ def at_least(least: int):
 
 @contextlib.contextmanager
 def told_errors():
-    """Print errors that a user can mend without a traceback, and turn Ctrl-C into an exit status."""
+    """Context manager for a command: print errors that a user can mend without a traceback, and exit with a status.
+
+    Ctrl-C leads to the exit status `INTERRUPTED`.
+    """
     from gymnasium.error import DependencyNotInstalled
 
     try:
@@ -74,7 +77,7 @@ def told_errors():
 
 @contextlib.contextmanager
 def ending_on_sigterm() -> Iterator[None]:
-    """End the block at SIGTERM as at Ctrl-C: programs started in the background ignore SIGINT."""
+    """Context manager that treats SIGTERM like Ctrl-C, since programs started in the background ignore SIGINT."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield
@@ -83,7 +86,10 @@ def ending_on_sigterm() -> Iterator[None]:
 
 
 def collect(found: list, parts: Iterable[list]) -> bool:
-    """Append each part to the list once it is measured; False if Ctrl-C came before the last."""
+    """Append the rows of each part of a measurement to `found`, as soon as they are measured.
+
+    Returns True after the last part, and False if Ctrl-C has interrupted the measurement.
+    """
     try:
         for part in parts:
             found += part
@@ -93,7 +99,15 @@ def collect(found: list, parts: Iterable[list]) -> bool:
 
 
 def end(is_complete: bool, lacking: str = "") -> None:
-    """Print why a measurement is incomplete, or which package a picture lacks, and exit with the status for it."""
+    """End a command: print why its result is incomplete, and exit with a nonzero status in that case.
+
+    Parameters
+    ----------
+    is_complete : bool
+        False if Ctrl-C has interrupted the measurement.
+    lacking : str
+        Message about a package that a picture needs and that is missing; "": none.
+    """
     if lacking:
         typer.echo(f"Error: {lacking}", err=True)
     if not is_complete:
@@ -104,9 +118,10 @@ def end(is_complete: bool, lacking: str = "") -> None:
 
 
 def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
-    """Return the path of a plot if matplotlib is installed, and the message for `end` if it is not.
+    """Check whether a plot can be drawn, before the measurement.
 
-    The message is also printed at once, before the measurement, so that a user can still stop it.
+    Returns the path and "" if matplotlib is installed or no plot is requested. Else it returns None and a message for
+    `end`, which it also prints at once, so that a user can stop the command.
     """
     from rigid_env.lab.measure.plotting import lacks_matplotlib
 
@@ -117,7 +132,7 @@ def drawable(path: Path | None, console: Console) -> tuple[Path | None, str]:
 
 
 def write(path: Path | None, content: dict, console: Console) -> None:
-    """Write numbers and the machine that measured them as JSON, and print the path."""
+    """Write numbers as JSON to `path`, with a description of the machine, and print the path; None: write nothing."""
     if path is None:
         return
     from rigid_env.lab.measure.machine import write_json

@@ -1,4 +1,4 @@
-"""The command that documents a task."""
+"""Command `describe`, which documents a task."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rigid_env.envs.env import RigidEnv
     from rigid_env.tasks.describe import Section
 
-NUMBERS = ("Num", "Min", "Max", "Numbers")  # columns
+NUMBERS = ("Num", "Min", "Max", "Numbers")  # columns that hold numbers
 
 
 @app.command(short_help="Document a task: spaces, rewards, draws, episode end, arguments.")
@@ -57,14 +57,14 @@ def describe(
 
 
 def _make(task: str) -> RigidEnv:
-    """Environment of an id, of a task's class, or of a scene.
+    """Make the environment of an id, of a task's class, or of a scene.
 
-    Without a scene `rigid_env/Scene-v0` has one body and a goal, as its docstring.
+    Without a scene `rigid_env/Scene-v0` has one body and a goal, as in its docstring.
 
     Raises
     ------
     ValueError
-        There is none, or it is not of this package.
+        There is no such environment, or it is not of this package.
     """
     from physics import scenes
     from rigid_env.envs.named import make_named
@@ -79,7 +79,7 @@ def _make(task: str) -> RigidEnv:
 
 
 def _table(section: Section) -> Table:
-    """Table of a section; cells with numbers are never broken."""
+    """Table of a section of the documentation; columns with numbers are never broken."""
     table = Table([Column(name, is_number=name in NUMBERS) for name in map(_shown, section.columns)])
     for row in section.rows:
         table.add_row(*map(_shown, row))
@@ -87,5 +87,5 @@ def _table(section: Section) -> Table:
 
 
 def _shown(text: str) -> str:
-    """Text without Markdown's marks of code."""
+    """Text without the backticks of Markdown."""
     return text.replace("`", "")

@@ -1,4 +1,4 @@
-"""Commands that simulate, explain and compile scenes."""
+"""Commands that simulate, explain, replay and compile scenes."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _lacks_pictures() -> str:
 
 
 def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float, console: Console) -> Demo:
-    """Run a scene and print what happened."""
+    """Simulate a scene and print what happened; returns the run."""
     from rigid_env.lab.demo import Demo
     from rigid_env.lab.demo_report import show
 
@@ -201,7 +201,7 @@ def explain(
 
 
 def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Console) -> list[dict]:
-    """Measure and print each effect's share in a run; return the same for JSON."""
+    """Measure and print the share of a run in which each effect acts, and its computing time; returns rows for JSON."""
     from rigid_env.lab.measure import shares
 
     with progress_bar(console, has_thread=False) as progress:

@@ -1,7 +1,7 @@
-"""Paths of files that commands write: checked before the computation, their folders made after it.
+"""Check the paths of files that a command will write, before it computes anything.
 
-One rule for all: the ending is one that the command writes, the path is no folder, and the file, or the nearest folder
-above it that exists, can be written.
+A path must have an ending that the command writes, and must not be a folder. The file, or the nearest folder above it
+that exists, must be writable.
 """
 
 from __future__ import annotations
@@ -17,15 +17,16 @@ PLOTS = (".png", ".pdf", ".svg")  # of numbers
 
 
 def output_option(name: str, *endings: str, help: str):
-    """An option for a file that is written; its path is checked when the command line is read.
+    """Make an option for a file that the command writes; the path is checked when the command line is read.
 
     Parameters
     ----------
     name : str
-        Of the option, as typed.
+        Name of the option, as typed.
     endings : str
-        That are allowed; the help names them where there are several.
+        Allowed endings; the help lists them if there are several.
     help : str
+        Help text; it ends with a period.
     """
     text = help if len(endings) == 1 else f"{help[:-1]}: {' or '.join(endings)}."
 
@@ -36,7 +37,7 @@ def output_option(name: str, *endings: str, help: str):
 
 
 def checked(path: Path, endings: Sequence[str]) -> Path:
-    """Absolute path of a file, checked to be writable; makes nothing.
+    """Check that a file can be written, and return its absolute path; nothing is created.
 
     Devices, such as ``/dev/stdout``, need no ending.
 
@@ -61,7 +62,7 @@ def checked(path: Path, endings: Sequence[str]) -> Path:
 
 
 def checked_folder(path: Path) -> Path:
-    """Absolute path of a folder that exists or can be made; makes nothing.
+    """Check that a folder exists or can be made, and return its absolute path; nothing is created.
 
     Raises
     ------
@@ -78,12 +79,12 @@ def checked_folder(path: Path) -> Path:
 
 
 def make_parents(*paths: Path | None) -> None:
-    """Make the folders of files that are about to be computed.
+    """Make the missing folders above files that are about to be written; None stands for no file.
 
     Raises
     ------
     typer.BadParameter
-        The system refuses.
+        The system refuses to make a folder.
     """
     for path in paths:
         if path is None:

@@ -1,4 +1,4 @@
-"""Commands that measure: speed, costs of effects, accuracy, tosses, hard cases."""
+"""Commands that measure: speed, computing time of effects, accuracy, tosses, hard cases."""
 
 from __future__ import annotations
 

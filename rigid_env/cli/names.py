@@ -1,4 +1,4 @@
-"""Names that a user types: scenes, presets, effects and cases, found and completed."""
+"""Names that a user types in a shell, such as scenes and presets: find what they mean, and complete them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CANONICAL = (
 
 
 def load_scene(name: str) -> tuple[str, Scene]:
-    """Return the scene of a name or a file, and a short name for it.
+    """Find the scene of a name or a file; returns a short name for it, and the scene.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def load_scene(name: str) -> tuple[str, Scene]:
 
 
 def checked_preset(name: str | None) -> str | None:
-    """Check the name of a preset, for the `callback` of an option; a shell can pass no `physics.Accuracy`."""
+    """Check that `name` is a preset, for the `callback` of an option, and return it; None stays None."""
     from physics import PRESETS
     from physics.keywords import nearest_first
 
@@ -47,28 +47,28 @@ def checked_preset(name: str | None) -> str | None:
 
 
 def complete_scene(incomplete: str) -> list[str]:
-    """Canonical scenes and scene files that begin like this."""
+    """Canonical scenes and scene files whose names begin with the typed text."""
     from physics import scenes
 
     return [*_starting(incomplete, scenes.SCENES), *_scene_files(incomplete)]
 
 
 def complete_preset(incomplete: str) -> list[str]:
-    """Presets that begin like this."""
+    """Presets whose names begin with the typed text."""
     from physics import PRESETS
 
     return _starting(incomplete, PRESETS)
 
 
 def complete_presets(incomplete: str) -> list[str]:
-    """Presets with commas between them."""
+    """Completions of a list of presets with commas, whose last name is incomplete."""
     from physics import PRESETS
 
     return _listed(incomplete, PRESETS)
 
 
 def complete_truth(incomplete: str) -> list[str]:
-    """Scenes whose accuracy can be measured, and scene files."""
+    """Scenes whose accuracy can be measured, and scene files, whose names begin with the typed text."""
     from rigid_env.lab.measure import accuracy
 
     return [*_starting(incomplete, accuracy.names()), *_scene_files(incomplete)]
@@ -82,28 +82,28 @@ def complete_trained(incomplete: str) -> list[str]:
 
 
 def complete_peers(incomplete: str) -> list[str]:
-    """Other engines with commas between them."""
+    """Completions of a list of other engines with commas, whose last name is incomplete."""
     from rigid_env.lab.measure import peers
 
     return _listed(incomplete, peers.ENGINES)
 
 
 def complete_effect(incomplete: str) -> list[str]:
-    """Effects whose cost can be measured."""
+    """Effects whose computing time can be measured and whose names begin with the typed text."""
     from rigid_env.lab.measure.effects import CASES
 
     return _starting(incomplete, CASES)
 
 
 def complete_case(incomplete: str) -> list[str]:
-    """Names of hard cases."""
+    """Hard cases whose names begin with the typed text."""
     from rigid_env.hard_cases import registry
 
     return _starting(incomplete, (case.name for case in registry.CASES))
 
 
 def _scene_files(incomplete: str) -> list[str]:
-    """Scene files, and folders, that begin like this."""
+    """Scene files and folders whose paths begin with the typed text."""
     folder, _, start = incomplete.rpartition("/")
     place = Path(folder + "/") if folder or incomplete.startswith("/") else Path()
     files = (path for path in sorted(place.glob("*")) if path.is_dir() or path.suffix in SCENE_FILES)
@@ -116,6 +116,6 @@ def _starting(incomplete: str, known: Iterable[str]) -> list[str]:
 
 
 def _listed(incomplete: str, known: Iterable[str]) -> list[str]:
-    """Completions of the last of some names with commas."""
+    """Completions of the last name in a list of `known` names with commas; names already listed are left out."""
     done, comma, last = incomplete.rpartition(",")
     return [done + comma + name for name in _starting(last, known) if name not in done.split(",")]

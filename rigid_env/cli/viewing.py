@@ -1,4 +1,4 @@
-"""The commands that show something in a browser."""
+"""Commands `view` and `play`, which show something in a browser."""
 
 from __future__ import annotations
 
@@ -111,9 +111,10 @@ def _export(what: str, path: Path, duration: float, settings: dict, console) -> 
 
 
 def _serve(what: str, host: str, port: int, browser: bool, settings: dict, console) -> None:
-    """Serve until Ctrl-C or SIGTERM; print the address once the subject of the viewer is ready.
+    """Serve the viewer until Ctrl-C or SIGTERM; print its address once the subject is ready.
 
-    For a canonical scene the address is printed at once. The browser then loads the page while the engine is imported.
+    The address for a canonical scene is printed at once, so that the browser loads the page while the engine is
+    imported.
     """
     from rigid_env.viewer.servers import start_viewer_server, stop_server
 
@@ -137,7 +138,7 @@ def _serve(what: str, host: str, port: int, browser: bool, settings: dict, conso
 
 
 def _tell_address(server, browser: bool, console) -> None:
-    """Print the address of a viewer, and open a browser there if one is wanted."""
+    """Print the address of a viewer's server, and open it in a browser if `browser` is True."""
     from rigid_env.viewer.servers import address_of, directions
 
     for text in directions(server):

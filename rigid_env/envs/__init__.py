@@ -1,1 +1,1 @@
-"""Gymnasium environments: single, native vector, Stable-Baselines3."""
+"""Gymnasium environments of a task: single, native vector, and the adapter for Stable-Baselines3."""

@@ -1,4 +1,4 @@
-"""Groups of arguments that several environments take."""
+"""Groups of constructor arguments that several environments share, as dataclasses."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from rigid_env.tasks import Task
 
 @dataclass(frozen=True)
 class TaskArgument:
-    """Task behind an environment."""
+    """Argument for the task behind an environment."""
 
     task: Task
 
 
 @dataclass(frozen=True)
 class CountArgument:
-    """Worlds of a vector environment."""
+    """Argument for the number of worlds in a vector environment."""
 
     num_envs: int = 1
 

@@ -1,4 +1,4 @@
-"""Attributes of environments that have a value in each world: parameters of the episode, random generator."""
+"""Attributes of environments that differ between worlds: drawn parameters of the episode, random generators."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def value_of(value: Any) -> Any:
 
 
 class EpisodeParameters:
-    """Parameters of a single environment's episode as attributes that can be read and set.
+    """Drawn parameters of a single environment's episode, as attributes that can be read and set.
 
     Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then.
     """
@@ -67,30 +67,30 @@ SHARED = (
 """Names of attributes that are the same in all worlds of a batch."""
 
 OF_BLOCKS = ("half_width", "walls")
-"""Names of further shared attributes, of the block's tasks."""
+"""Names of further attributes that all worlds share, only in the block's tasks."""
 
 SINGLE = ("action_space", "observation_space", "np_random", "np_random_seed")
-"""Names of a world's attributes that a batch keeps under another name or as a tuple."""
+"""Names of attributes of one world that a batch has under another name or as a tuple."""
 
 
 class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
-    """`call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
+    """Methods `call`, `get_attr` and `set_attr` of Gymnasium's vector environments, for a native batch.
 
-    Gymnasium's `SyncVectorEnv` calls its environments one by one; here each call reads the batch. Names without a
-    meaning for a single world of it are refused, never ignored.
+    Gymnasium's `SyncVectorEnv` calls its environments one by one; here a call reads the arrays of the batch. A name
+    that has no meaning for a single world raises an error.
     """
 
     task: Any
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """An attribute of every world.
+        """Get an attribute of every world.
 
         Parameters
         ----------
         name : str
-            A drawn value of the running episodes, such as ``mass``; ``np_random``, ``np_random_seed``; ``action_space``
-            and ``observation_space`` of one world; ``elapsed_steps``; and the settings of the batch (`SHARED`), the
-            same in all worlds.
+            One of: a drawn value of the running episodes, such as ``mass``; ``np_random``, ``np_random_seed``;
+            ``action_space`` and ``observation_space`` of one world; ``elapsed_steps``; a setting of the batch
+            (`SHARED`), which is the same in all worlds.
 
         Returns
         -------
@@ -99,7 +99,7 @@ class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
         Raises
         ------
         AttributeError
-            Listing the names there are, the nearest first.
+            Listing the known names, the nearest first.
         """
         if name in self.task.drawn:
             return tuple(value_of(value) for value in self.task.drawn[name])
@@ -121,18 +121,19 @@ class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
         Parameters
         ----------
         name : str
-            A drawn value: ``mass`` and the other physical parameters from now on, in the running and all later
-            episodes, other names in all later ones; None draws it again from the next episode on.
-            ``max_episode_steps``, the same for all worlds.
+            Name of a drawn value, or ``max_episode_steps``, which is the same for all worlds. A physical parameter such
+            as ``mass`` changes at once, in the running and all later episodes; other drawn values change in later
+            episodes. None draws the value again from the next episode on.
         values : list, tuple or anything else
-            A list or a tuple has one entry for each world; anything else, a (3,) array of a size included, is for all.
+            A list or a tuple has one entry for each world. Anything else is one value for all, such as a (3,) array for
+            a size.
 
         Raises
         ------
         AttributeError
-            A name that can only be given to the constructor, or is none.
+            A name that is unknown, or can only be given to the constructor.
         ValueError
-            Naming the field, the value and what is allowed. Nothing has changed then.
+            The message names the field, its value and what is allowed. Nothing has changed then.
         """
         settable = (*self.task.drawn, "max_episode_steps")
         if name not in settable:
@@ -148,7 +149,7 @@ class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
             self.task.hold(name, values)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Call a method of every world, or get an attribute of it.
+        """Call `render` for every world, or get an attribute of it.
 
         Parameters
         ----------
@@ -164,7 +165,7 @@ class BatchAttributes(gym.vector.VectorEnv[Obs, NDArray[Any], NDArray[Any]]):
         AttributeError
             Any other name: a batch is reset, stepped and closed as a whole.
         TypeError
-            Arguments, which neither takes.
+            Further arguments, which are never allowed.
         """
         if name in ("reset", "step", "close"):
             raise AttributeError(

@@ -1,4 +1,4 @@
-"""Common base of the block's environments, single and native vector."""
+"""Base classes of the block's environments, single and native vector."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
     render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `RigidEnv`.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `rigid_env.tasks.block.BlockTask`.
+        Arguments of the task, see `rigid_env.tasks.block.BlockTask`.
     threads : int
-        Taken so that the same arguments make a batch; one world has one thread.
+        Accepted so that the same arguments make a batch, too; a single world always has one thread.
 
     Raises
     ------
     TypeError
         An unknown argument, with the known ones, the nearest first.
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     task_class: ClassVar[type[BlockTask]]
@@ -69,14 +69,14 @@ class BlockVectorEnv(RigidVectorEnv[NDArray[Any]]):
     threads : int
         Threads that share a step.
     accuracy, walls, half_width, mass, size, friction, restitution, gravity, effects, frame_skip, dt, dump_faults
-        Of the task, see `rigid_env.tasks.block.BlockTask`.
+        Arguments of the task, see `rigid_env.tasks.block.BlockTask`.
 
     Raises
     ------
     TypeError
         An unknown argument, with the known ones, the nearest first.
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     task_class: ClassVar[type[BlockTask]]

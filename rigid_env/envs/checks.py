@@ -37,20 +37,21 @@ def check_task(
     Parameters
     ----------
     task : class of Task, or str
-        The class, or where it stands, ``module:Class``.
+        Class, or its name ``module:Class``.
     steps : int
-        Control steps of each comparison, in episodes of a third of them.
+        Control steps of each comparison; episodes have a third of them.
     contexts : tuple of str
-        Ways to start workers that are tried; a class that stands in `__main__` without a file cannot be spawned.
+        Ways to start worker processes, each of which is checked. "spawn" fails for a class in `__main__` without a
+        file.
     settings
-        Arguments of the task, ``contacts`` and ``impacts`` of its environments.
+        Arguments of the task, and ``contacts`` and ``impacts`` of its environments.
 
     Raises
     ------
     CheckError
-        Saying what differs, where, and by how much.
+        Naming the quantity that differs, the place, and the difference.
     ValueError
-        The task itself refuses; see `Task`.
+        The task cannot be made with these arguments; see `Task`.
     """
     kind = task_class(task)
     check = _Checks(kind, steps, settings)
@@ -66,7 +67,7 @@ def check_task(
 
 
 class _Checks:
-    """The comparisons of `check_task`."""
+    """Comparisons that `check_task` makes for one task class."""
 
     def __init__(self, kind: type[Task], steps: int, settings: dict[str, Any]):
         self.kind, self.steps, self.settings = kind, steps, settings
@@ -75,11 +76,11 @@ class _Checks:
         self.actions = np.random.default_rng(SEED).uniform(-1.0, 1.0, (steps, ENVS, *size)).astype(np.float32)
 
     def batch(self, mode: AutoresetMode = AutoresetMode.DISABLED, limit: int | None = None) -> TaskVectorEnv:
-        """A batch of `ENVS` worlds."""
+        """Make a batch of `ENVS` worlds of the task, with episodes of at most `limit` steps."""
         return TaskVectorEnv(ENVS, task=self.kind, autoreset_mode=mode, max_episode_steps=limit, **self.settings)
 
     def alone_as_in_a_batch(self) -> None:
-        """Compare world i of a batch with an environment of its seed, bit for bit."""
+        """Compare each world of a batch with a single environment of the same seed, bit for bit."""
         envs = self.batch()
         together, _ = envs.reset(seed=SEED)
         singles = [TaskEnv(self.kind, **self.settings) for _ in range(ENVS)]
@@ -157,7 +158,7 @@ class _Checks:
                 _same("episode of a pickled copy", env.reset()[0], twin.reset()[0], f"step {k}")
 
     def workers(self, task: type[Task] | str, context: str) -> None:
-        """Check that worker processes give the numbers of the batch."""
+        """Compare environments in worker processes, started by `context`, with the batch."""
         settings = self.settings
         make: Callable[[], gym.Env] = lambda: TaskEnv(task, **settings)  # noqa: E731 (a closure, which workers are sent)
         workers = gym.vector.AsyncVectorEnv([make] * 2, context=context)
@@ -181,9 +182,10 @@ class _Checks:
 
 
 class _Episodes:
-    """Steps and starts of a single environment, for comparison with those of a world of a batch.
+    """Record of a single environment's steps and starts, for comparison with a world of a batch.
 
-    A field that changes with time sees the one time of a batch: later episodes of such a scene are not compared.
+    A force field that depends on time sees the common time of the batch. So later episodes of such a scene are not
+    compared.
     """
 
     def __init__(self, env: TaskEnv, world: int, actions: np.ndarray, limit: int):
@@ -191,7 +193,7 @@ class _Episodes:
         env.reset(seed=SEED + world)
         self.sees_time = reads_time(env.task.world.plan, env.task.world.params)
         self.steps: list[tuple] = []  # observation, reward, end and truncation of each
-        self.starts: dict[int, tuple] = {}  # observation and info of those after these steps
+        self.starts: dict[int, tuple] = {}  # observation and info of each reset, by the step before it
         count = 0
         for k, action in enumerate(actions):
             obs, reward, is_ended, _, _ = env.step(action)
@@ -201,14 +203,14 @@ class _Episodes:
                 self.starts[k], count = env.reset(), 0
 
     def steps_as(self, k: int, theirs: tuple, mode: AutoresetMode) -> None:
-        """Compare step k of the world."""
+        """Check that step k equals that of the batch's world: observation, reward, end and truncation in `theirs`."""
         if not self._has(k):
             return
         for what, ours, other in zip(("observation", "reward", "end", "truncation"), self.steps[k], theirs):
             _same(what, ours, other, self._where(k, mode))
 
     def starts_as(self, k: int, obs, infos: dict[str, Any], mode: AutoresetMode) -> None:
-        """Compare the start after step k of the world."""
+        """Check that the start after step k equals that of the batch's world."""
         if not self._has(k):
             return
         ours, told = self.starts[k]

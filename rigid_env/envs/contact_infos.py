@@ -1,4 +1,4 @@
-"""Contacts and impacts in infos, of single environments and of batches."""
+"""Entries of infos about contacts and impacts, for single environments and batches."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ IMPACT_KEYS = tuple(f"impact_{field}" for field in Impacts._fields)
 
 
 class _Reader(NamedTuple):
-    """Reader of arrays with a row for each world, and their keys in infos."""
+    """Function that reads `rows` contacts or impacts of each world, and the keys of its arrays in infos."""
 
     keys: tuple[str, ...]
     read: Callable[..., tuple[np.ndarray, ...]]
@@ -33,12 +33,13 @@ class ContactInfos:
     ----------
     task : Task
     contacts, impacts : int
-        Rows of each world: contacts with the largest forces, pairs that collided with the largest impulses. 0: none.
+        Rows of each world: contacts with the largest forces, and pairs that collided with the largest impulses. 0:
+        none.
 
     Attributes
     ----------
     keys : tuple of str
-        Of all entries.
+        Keys of all entries.
     """
 
     def __init__(self, task: Task, contacts: int, impacts: int):
@@ -65,7 +66,7 @@ class ContactInfos:
 
 
 def contact_infos(task: Task, contacts: int, impacts: int) -> ContactInfos | None:
-    """Make the reader for the environment's arguments `contacts` and `impacts`; None where both are 0.
+    """Make the reader for the environment's arguments `contacts` and `impacts`; None if both are 0.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Hand-written controllers: where each stands, and those of the block's two tasks.
+"""Handwritten controllers: where each stands, and those of the block's two tasks.
 
-A controller is a function from observations (n, entries) to actions (n, 6). It sees what an agent sees, and knows the
-block's observation table (see `rigid_env.envs.block_reach`), nothing else.
+A controller is a function from observations (n, entries) to actions (n, 6). It gets the same observations as an agent,
+and knows only the block's observation table (see `rigid_env.envs.block_reach`).
 """
 
 from __future__ import annotations
@@ -22,28 +22,28 @@ SPEED = 5.0  # [m/s]
 SPIN = 5.0  # [rad/s]
 
 # --- BlockReach -------------------------------------------------------------------------------------------
-LIFT = 0.75  # share of the force limit that takes weight off the floor, and friction with it
-ACCELERATION = 3.0  # to brake with, such that the speed wanted at distance d is sqrt(2 a d) [m/s²]
-APPROACH = 3.0  # speed wanted per distance close to the goal, where that is less [1/s]
+LIFT = 0.75  # share of the force limit that lifts, which reduces friction on the floor
+ACCELERATION = 3.0  # deceleration a; the desired speed at distance d is sqrt(2 a d) [m/s²]
+APPROACH = 3.0  # largest desired speed per distance, for the approach to the goal [1/s]
 TOP_SPEED = 6.0  # [m/s]
 SPEED_GAIN = 0.6  # share of the force limit per m/s of error
 TILT_GAIN = 2.0  # share of the torque limit per sine of the tilt
 SPIN_GAIN = 0.5  # share of the torque limit per rad/s
-ARRIVED = 0.15  # distance within which the block is let down, and friction stops it [m]
+ARRIVED = 0.15  # distance within which the block is no longer lifted, so that friction stops it [m]
 
 # --- BlockReorient ----------------------------------------------------------------------------------------
 TURN_GAIN = 2.0  # share of the torque limit per radian
 TURN_DAMPING = 0.9  # share of the torque limit per rad/s
 DRIFT_GAIN = 0.3  # share of the force limit per m/s of sideways drift
-TURNED = 0.15  # angle within which the block is let down to rest [rad]
+TURNED = 0.15  # angle within which the block is no longer lifted [rad]
 HALF_TURN = 1e-3  # |sine| of the angle below which its axis is not determined
 
 
 def reach_controller(observations: np.ndarray) -> np.ndarray:
-    """BlockReach by hand: carry most of the weight, slide to the goal no faster than one can brake, set down.
+    """Controller for BlockReach: carries most of the weight, and slides the block to the goal, slowly enough to brake.
 
-    The friction that remains under the lifted block is left to the speed loop to overcome; a torque turns the
-    body axis that is nearest to the vertical into it, so that the block stays on its face.
+    A speed controller overcomes the remaining friction. A torque keeps the body axis that is nearest to the vertical
+    vertical, so that the block stays on its face.
 
     Parameters
     ----------
@@ -71,7 +71,10 @@ def reach_controller(observations: np.ndarray) -> np.ndarray:
 
 
 def _tilt(rotation: np.ndarray) -> np.ndarray:
-    """Axis times sine of the turn (n, 3) that makes the nearest body axis vertical, from R (n, 9) by rows."""
+    """Axis times sine of the angle (n, 3) of the rotation that makes the nearest body axis vertical.
+
+    `rotation` has the rotation matrices (n, 9), row by row.
+    """
     heights = rotation[:, 3:6]
     nearest = np.argmax(np.abs(heights), axis=1)
     rows = np.arange(len(rotation))
@@ -80,7 +83,7 @@ def _tilt(rotation: np.ndarray) -> np.ndarray:
 
 
 def reorient_controller(observations: np.ndarray) -> np.ndarray:
-    """BlockReorient by hand: carry the weight, turn the target face down about the shortest arc, set down.
+    """Controller for BlockReorient: carries the weight, turns the target face down the shortest way, sets it down.
 
     Parameters
     ----------

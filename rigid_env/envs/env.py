@@ -40,31 +40,32 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
     Parameters
     ----------
     task : Task
-        Of one world.
+        Task with one world.
     render_mode : {"rgb_array", "human"} or None
     width, height : int
-        Of pictures [px].
+        Size of the pictures that `render` returns [px].
     obs : {"state", "pixels"}
-        Observations: the numbers of the task's entries, or pictures of `obs_size`, of the last `obs_stack` steps; see
+        Observations: "state" has the numbers of the task's entries, "pixels" has pictures; see
         `rigid_env.envs.sources`.
     obs_size : (2,) int
-        Height and width [px].
+        Height and width of observed pictures [px].
     obs_stack : int
+        Pictures in one observation, of the last control steps.
     contacts : int
-        Contacts that every info tells, those with the largest forces; see `physics.Contacts`. 0: none.
+        Number of contacts in every info, those with the largest forces; see `physics.Contacts`. 0: none.
     impacts : int
-        Pairs that collided in the control step that every info tells, those with the largest impulses; see
-        `physics.Impacts`. 0: none, and impacts are not kept.
+        Number of pairs in every info that collided in the control step, those with the largest impulses; see
+        `physics.Impacts`. 0: none, and impacts are not recorded.
     camera : Camera, mapping or None
-        Of pictures that `render` makes: a `rigid_env.rendering.Camera`, or a mapping of its parameters. None has the
-        whole room in sight. Observations keep their own view.
+        Camera of `render`: a `rigid_env.rendering.Camera`, or a mapping of its parameters. None has the whole room in
+        view. Observed pictures have their own camera.
     arrows : bool
-        Whether these show contact points, forces and torques.
+        Whether pictures of `render` show contact points, forces and torques.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": RENDER_FPS}  # noqa: RUF012
@@ -94,15 +95,16 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         Parameters
         ----------
         seed : int, optional
-            Of the generator that draws starts, goals and parameters. None: go on with the one there is.
+            Seed of a new generator, which draws starts, goals and parameters. None: continue with the present
+            generator.
         options : dict, optional
-            What is fixed instead of drawn; see Starting State in the class.
+            Values that are fixed instead of drawn, by name; see Starting State in the class.
 
         Returns
         -------
         observation : (entries,) float32
         info : dict
-            As of `step`, and what was drawn for the episode, by name, except what `effects` take the place of.
+            As of `step`, and the drawn values of the episode, by name, without parameters that `effects` fix.
 
         Raises
         ------
@@ -145,7 +147,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         terminated : bool
             True on success and on failure.
         truncated : bool
-            Always False: the time limit is `gymnasium.make`'s.
+            Always False; the time limit is a wrapper of `gymnasium.make`.
         info : dict
 
         Raises
@@ -201,15 +203,15 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         Parameters
         ----------
         state : TaskState
-            Of `get_state`.
+            State that `get_state` of an environment or of a batch returned.
         source : int
-            World of the state.
+            Index of the world of the state, 0 for a state of one world.
 
         Raises
         ------
         ValueError
-            It is no state, one of another task or of other settings (`TaskState.settings`; both values are told), or it
-            has no such world. Nothing has changed then.
+            An object that is no state, a state of another task or of other settings (`TaskState.settings`), or one
+            without this world. Nothing has changed then.
         """
         arrays = self._arrays()
         reinstate(self.task, arrays, state, source=None if source == 0 and getattr(state, "worlds", 0) == 1 else source)
@@ -217,12 +219,12 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         self._has_reset, self._is_closed = not arrays["waiting"][0], False
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        """Memory of the environment, with one row: the names are those of a batch."""
+        """Arrays of the environment that belong to its state, with one row; their names are those of a batch."""
         flags = {"waiting": np.array([not self._has_reset]), "ended": np.zeros(1, dtype=np.bool_)}
         return {**flags, **self._source.arrays}
 
     def render(self) -> NDArray[np.uint8] | None:
-        """(height, width, 3) uint8 picture in mode "rgb_array"; in mode "human" shows it and returns None."""
+        """Draw the world: return the (height, width, 3) picture in mode "rgb_array", show it in mode "human"."""
         if self._is_closed:
             raise self._not_ready("render")
         if self.render_mode is None:
@@ -247,7 +249,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         return type(self.task)
 
     def close(self) -> None:
-        """Close the window, if any; `reset` begins anew."""
+        """Close the window, if there is one; `reset` opens the environment again."""
         self._view.close()
         self._is_closed, self._has_reset = True, False
 

@@ -1,4 +1,4 @@
-"""Observations and rewards of tasks with goals."""
+"""Observations and rewards of environments with goals."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from rigid_env.tasks import Task
 from rigid_env.tasks.goal import GoalTask
 
 METHODS = ("compute_reward", "compute_terminated", "compute_truncated")
-"""Functions of goals alone, as Gymnasium-Robotics has them; they look at no environment."""
+"""Methods that depend only on goals, not on the state of an environment, as in Gymnasium-Robotics."""
 
 
 def lend_goals(task: Task, env) -> None:
-    """Give an environment the methods `METHODS` of a task with goals; other environments must lack them."""
+    """Give an environment the methods `METHODS` of its task, if the task has goals."""
     if isinstance(task, GoalTask):
         for name in METHODS:
             setattr(env, name, getattr(task, name))
 
 
 class GoalSource:
-    """Source of observations as dicts, each with the achieved and the desired goal.
+    """Source of observations as dicts, which contain the achieved and the desired goal.
 
     Parameters
     ----------
     task : GoalTask
     inner : StateSource or PixelSource
-        Of the part ``observation``.
+        Source of the part ``observation``.
 
     Attributes
     ----------
     space : gymnasium.spaces.Dict
-        Of one world: ``observation``, ``achieved_goal`` and ``desired_goal``.
+        Space of one world's observation: ``observation``, ``achieved_goal`` and ``desired_goal``.
     """
 
     def __init__(self, task: GoalTask, inner):
@@ -46,12 +46,12 @@ class GoalSource:
         return self._inner.arrays
 
     def one(self, world: int) -> dict[str, np.ndarray]:
-        """Observation of one world, a copy."""
+        """Copy of the observation of one world."""
         achieved, desired = self._task.achieved_goal[world], self._task.desired_goal[world]
         return self._dict(self._inner.one(world), achieved.copy(), desired.copy())
 
     def all(self) -> dict[str, np.ndarray]:
-        """Observations of all worlds, a copy."""
+        """Copy of the observations of all worlds."""
         return self._dict(self._inner.all(), self._task.achieved_goal.copy(), self._task.desired_goal.copy())
 
     @staticmethod

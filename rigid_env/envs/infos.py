@@ -1,4 +1,4 @@
-"""Info of one environment's step."""
+"""Make the info dict of a single environment's step."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from rigid_env.tasks.layout import INFO, SUCCESS
 
 
 class InfoMaker:
-    """Maker of the info dict of a step, from the row of an outcome and the status.
+    """Maker of the info dict of a step, from a row of the task's outcomes and the step's status.
 
-    It is built by a dict display with these names, compiled when this is made: `dict(zip(names, row))` takes three
-    times as long, a twentieth of a step of one environment.
+    It compiles a function that consists of a dict display with these names. `dict(zip(names, row))` would take three
+    times as long, which is a twentieth of a step of one environment.
 
     Parameters
     ----------
     names : tuple of str
-        Of the row's numbers from `INFO` on.
+        Names of the numbers in the row from the column `INFO` on.
     """
 
     def __init__(self, names: tuple[str, ...]):
@@ -31,7 +31,7 @@ class InfoMaker:
         self._make = eval(source)
 
     def __call__(self, row: list[float], status: int) -> dict[str, Any]:
-        """Info of an outcome."""
+        """Info dict for a row of outcomes and a `physics.Status`."""
         return self._make(row, status)
 
     def __reduce__(self):
@@ -39,7 +39,7 @@ class InfoMaker:
 
 
 class ContactInfoMaker:
-    """Maker of an info dict that also holds contacts or impacts of the world.
+    """Maker of an info dict that also contains contacts or impacts of the world.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ class ContactInfoMaker:
         self._plain, self._contacts = plain, contacts
 
     def __call__(self, row: list[float], status: int) -> dict[str, Any]:
-        """Info of an outcome, and of the contacts now."""
+        """Info dict for a row of outcomes and a `physics.Status`, with the present contacts and impacts."""
         return {**self._plain(row, status), **self._contacts.one()}
 
 
 def info_maker(task: Task, contacts: int, impacts: int) -> InfoMaker | ContactInfoMaker:
-    """Maker of the infos of a task of one world; other arguments as of `contact_infos.contact_infos`."""
+    """Make the maker of infos for a task of one world; other arguments as of `contact_infos.contact_infos`."""
     plain, reader = InfoMaker(task.info_names), contact_infos(task, contacts, impacts)
     return plain if reader is None else ContactInfoMaker(plain, reader)

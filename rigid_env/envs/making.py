@@ -18,12 +18,12 @@ OF_ENVIRONMENT = [each.name for each in fields(CommonArguments)]
 
 
 def task_class(task: type[Task] | str) -> type[Task]:
-    """Return a task class, given itself or as ``module:Class``.
+    """Return a task class, which is given as a class or by its name ``module:Class``.
 
     Raises
     ------
     ValueError
-        It is neither, or is not there.
+        It is neither a task class nor the name of one.
     """
     if isinstance(task, str):
         module, _, name = task.partition(":")

@@ -1,4 +1,4 @@
-"""Find an environment by the text that a user types: an id, or a task class, also from the working folder."""
+"""Find an environment by what a user types: an id, or a task class, also in the working folder."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from rigid_env.envs.task import TaskEnv
 CLASS = re.compile(r"[\w.]+:[A-Za-z_]\w*")
 
 NAMED = 5
-"""Number of names in the message about an unknown one."""
+"""Largest number of known names that the error about an unknown name lists."""
 
 
 def known_ids() -> list[str]:
-    """Ids of the environments of this package, its own and those of registered tasks."""
+    """Ids of all environments of this package, those of registered tasks included."""
     return [name for name, spec in gym.registry.items() if str(spec.entry_point).startswith("rigid_env.")]
 
 
 def near_names(name: str, others: Iterable[str] = ()) -> list[str]:
-    """Ids, and names of `others`, similar to a name without namespace, version and module; the first ids if none is.
+    """Ids, and names of `others`, that are similar to a name; the first ids if none is similar.
 
-    Gymnasium's own guess knows all environments, and no namespace that is left out.
+    Namespace, version and module of the names are ignored. Gymnasium's own suggestions include environments of other
+    packages, and do not work for an id without namespace.
     """
     bare = {_bare(each): each for each in [*others, *known_ids()]}
     found = [bare[each] for each in alike(_bare(name), bare)]
@@ -40,16 +41,16 @@ def _bare(name: str) -> str:
 
 
 def not_there(name: str, field: str = "env", why: object = "", others: Iterable[str] = ()) -> ValueError:
-    """Error for the name of no environment; it lists similar names.
+    """Make the error for a name that no environment has; it lists similar names.
 
     Parameters
     ----------
     name, field
         As of `make_named`.
     why : object
-        In brackets, such as the error of an import.
+        Reason in brackets, such as the error of an import.
     others : sequence of str
-        Names that are allowed besides.
+        Further names that are allowed.
     """
     near = ", ".join(map(repr, near_names(name, others)))
     reason = f" ({why})" if why else ""
@@ -65,19 +66,19 @@ def make_named(name: str, field: str = "env", others: Iterable[str] = ()) -> gym
     name : str
         Id, ``module:id``, or ``module:Class`` of a task.
     field : str
-        What the name is called in errors.
+        Name of the argument in errors.
     others : sequence of str
-        Names that the caller knows besides, for errors.
+        Further names that the caller allows, for errors.
 
     Returns
     -------
     gymnasium.Env
-        Wrapped as its id says; of a class, limited to the steps of its episodes.
+        For an id with the wrappers of `gymnasium.make`, for a class with the limit of its episodes.
 
     Raises
     ------
     ValueError
-        There is none, or it is not of this package.
+        There is no such environment, or it is not of this package.
     """
     if os.getcwd() not in sys.path:  # as `python -m` has it; an installed command does not
         sys.path.append(os.getcwd())

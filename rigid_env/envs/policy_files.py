@@ -1,6 +1,6 @@
 """Policies from files: models of Stable-Baselines3, and small networks as plain arrays.
 
-The ending of a file's name decides how it is read. Nothing of an ``.npz`` is run; a ``.zip`` is a model of
+The ending of a file's name decides how it is read. Reading an ``.npz`` runs no code. A ``.zip`` is a model of
 Stable-Baselines3, and code in it runs while it is read.
 
 A policy is a function from observations with the worlds first, (n, entries) or a dict of such arrays, to actions
@@ -12,11 +12,11 @@ Plain arrays are a NumPy archive (``.npz``) of a fully connected network:
 | --- | --- | --- |
 | `w0`, `w1`, ... | (inputs, outputs) | weights of the layers, in their order |
 | `b0`, `b1`, ... | (outputs,) | biases: a layer gives ``x @ w + b`` |
-| `activation` | text | after all layers but the last: `tanh` (also if missing), `relu`, `elu`, `sigmoid` or `linear` |
-| `output` | text | after the last one; `linear` where it is missing |
-| `mean`, `std` | (entries,) | optional: the network is given ``(observation - mean) / std`` |
+| `activation` | text | after each layer except the last: `tanh` (default), `relu`, `elu`, `sigmoid` or `linear` |
+| `output` | text | activation after the last layer; `linear` by default |
+| `mean`, `std` | (entries,) | optional: the input of the network is ``(observation - mean) / std`` |
 
-Where observations are a dict, their parts follow each other in the order of their names. Actions are clipped to ±1.
+The parts of an observation that is a dict are joined in the order of their names. Actions are clipped to ±1.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ DDPG is TD3 with other settings.
 KNOWN = ", ".join((*SETTINGS, "DDPG"))
 
 OTHER_POLICIES = ("sb3_contrib", "sbx")
-"""Packages whose policies have the settings of an algorithm above, and act in another way."""
+"""Packages whose policies have the same settings as an algorithm above but cannot be used here."""
 
 Observations = np.ndarray | Mapping[str, np.ndarray]
 
@@ -71,18 +71,19 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     ----------
     path : str or Path
         An id such as ``rigid_env/BlockReach-v0``, for the policy that comes with it; else a file, whose ending decides.
-        ``.npz``: plain arrays, of which nothing is run. ``.zip``: a model of Stable-Baselines3, which needs the extra
-        `agents`; code in it runs while it is read, as a line on standard error says: take it from those you trust only.
+        ``.npz``: plain arrays, without code. ``.zip``: a model of Stable-Baselines3, which needs the extra `agents`.
+        Code in a model runs while it is read, and a line on standard error says so: read only models from people whom
+        you trust.
 
     Returns
     -------
     callable
-        Observations with the worlds first to actions (n, numbers), the most likely ones.
+        Function from observations with the worlds first to the most likely actions (n, numbers).
 
     Raises
     ------
     ValueError
-        No such file, or not one of these.
+        There is no such file, or it has another format.
     gymnasium.error.DependencyNotInstalled
         It is a model, and the extra is not installed.
     """
@@ -107,18 +108,19 @@ def tell_code_runs(path: Path) -> None:
 
 
 def greedy(model: Any) -> Callable[[Observations], np.ndarray]:
-    """The most likely action of a model of Stable-Baselines3 for each observation."""
+    """Make a policy of a model of Stable-Baselines3: the most likely action for each observation."""
     return lambda observations: model.predict(observations, deterministic=True)[0]
 
 
 def load_model(path: Path) -> Any:
-    """Load a model of Stable-Baselines3 for acting. Its code runs; a line on standard error warns of that first.
+    """Load a model of Stable-Baselines3 that only acts; a line on standard error warns first that its code runs.
 
     Raises
     ------
     ValueError
-        It is no such model, or of no algorithm of `SETTINGS`.
+        The file is no such model, or its algorithm is not in `SETTINGS`.
     gymnasium.error.DependencyNotInstalled
+        The extra `agents` is not installed.
     """
     algorithm = _algorithm(path)
     require("agents", "torch", "stable_baselines3", purpose="a policy of Stable-Baselines3")
@@ -129,11 +131,11 @@ def load_model(path: Path) -> Any:
 
 
 def _algorithm(path: Path) -> str:
-    """Name of the algorithm of a model's file, read from its settings without running code."""
+    """Name of the algorithm of a model's file, found by its settings without running code."""
     try:
         with zipfile.ZipFile(path) as content:
             settings = content.read("data")
-    except Exception:  # whatever is wrong with it, it is none
+    except Exception:  # any error means that the file is no model
         told = f"allowed with the ending {MODEL} is a model of Stable-Baselines3, as its `save` writes it"
         raise ValueError(f"policy is {str(path)!r}, which is none; {told}") from None
     try:
@@ -149,15 +151,16 @@ def _algorithm(path: Path) -> str:
 
 
 class Network:
-    """A fully connected network of plain arrays; see the table in this module.
+    """Fully connected network of plain arrays; see the table in this module.
 
     Parameters
     ----------
     layers : sequence of pairs of arrays
-        Weights (inputs, outputs) and biases (outputs,).
+        Weights (inputs, outputs) and biases (outputs,) of each layer.
     activation, output : str
-        After each layer but the last, and after the last; of `ACTIVATIONS`.
+        Activation after each layer except the last, and after the last; keys of `ACTIVATIONS`.
     mean, std : (entries,) array_like, optional
+        The layers get (observation - mean) / std.
 
     Raises
     ------
@@ -188,11 +191,11 @@ class Network:
 
     @property
     def inputs(self) -> int:
-        """Numbers of an observation."""
+        """Number of entries of an observation."""
         return len(self.layers[0][0])
 
     def __call__(self, observations: Observations) -> np.ndarray:
-        """Actions (n, numbers) float32 of observations (n, entries), or of a dict of their parts.
+        """Actions (n, numbers) float32 for observations (n, entries), or for a dict of parts of them.
 
         Raises
         ------
@@ -212,7 +215,7 @@ class Network:
         return np.clip(ACTIVATIONS[self.output](x @ w + b), -1.0, 1.0).astype(np.float32)
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write the network as ``.npz``, which `path` must end with, for `load_policy`; return the path."""
+        """Write the network to a file whose name ends in ``.npz``, for `load_policy`; return the path."""
         if Path(validation.path(path)).suffix.lower() != ARRAYS:
             raise ValueError(f"path is {str(path)!r}; allowed is the ending {ARRAYS}")
         arrays = {f"{name}{k}": _short(part) for k, pair in enumerate(self.layers) for name, part in zip("wb", pair)}
@@ -227,7 +230,7 @@ class Network:
         Raises
         ------
         ValueError
-            It is none, or a damaged one.
+            The file contains no network, or a damaged one.
         """
         if not zipfile.is_zipfile(path):
             raise ValueError(f"policy is {str(path)!r}, which holds no network; allowed is what Network.save writes")
@@ -238,13 +241,13 @@ class Network:
             layers = [(parts[f"w{k}"], parts[f"b{k}"]) for k in range(count)]
             words = {name: str(parts[name]) for name in ("activation", "output") if name in parts}
             return cls(layers, **words, mean=parts.get("mean"), std=parts.get("std"))
-        except Exception as error:  # whatever is wrong with it, it is none
+        except Exception as error:  # any error means that the file holds no network
             told = f"there is no {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"policy is {str(path)!r}, which holds no network ({told})") from None
 
 
 def _numbers(array: np.ndarray, name: str, axes: int) -> np.ndarray:
-    """Finite float64 numbers with so many axes, none of them empty."""
+    """Check that an array has finite numbers, `axes` axes, and is not empty; returns it as float64."""
     array = np.asarray(array)
     if array.dtype.kind not in "fiu" or array.ndim != axes or array.size == 0 or not np.isfinite(array).all():
         raise ValueError(f"{name} has shape {array.shape} of {array.dtype}; allowed are finite numbers, {axes} axes")

@@ -1,4 +1,4 @@
-"""The ids under which Gymnasium finds the environments."""
+"""Ids of the environments, and their registration with Gymnasium."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from gymnasium.envs.registration import register, registry
 NAMESPACE = "rigid_env"
 
 MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
-"""Control steps after which an episode is truncated: 7.5 s at the default 25 ms."""
+"""Control steps after which an episode is truncated, by task: 7.5 s at the default 25 ms."""
 
 GOALS = {"BlockReachGoal": 75, "BlockReorientGoal": 75}
-"""Tasks with goals, and control steps of their episodes: 7.5 s at the default 50 ms."""
+"""Control steps after which an episode is truncated, by task with goals: 7.5 s at the default 100 ms."""
 
 SUITE = {"BlockCurl": 200}
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 
 SCENE_ID = f"{NAMESPACE}/Scene-v0"
-"""Environment of any scene: it needs the argument `scene`, whose file may limit the episodes."""
+"""Id of the environment for any scene; its argument `scene` is required, and the scene's file may limit episodes."""
 
 
 def register_envs() -> None:
-    """Register every environment of the package with Gymnasium; ids that are registered already stay.
+    """Register all environments of this package with Gymnasium; ids that are registered already stay.
 
-    ``import rigid_env`` calls it. Gymnasium imports no package on its own account in any version that this one runs
-    with (1.1 to 1.4): ``gymnasium.make("rigid_env/BlockReach-v0")`` needs that import first, in every process, and the
-    id ``"rigid_env:rigid_env/BlockReach-v0"`` brings it along, into workers, too. Versions that load plugins (the last
-    was 0.29) call this function through the entry point ``gymnasium.envs``.
+    ``import rigid_env`` calls it. Gymnasium 1.1 to 1.4, with which this package runs, does not import packages on its
+    own. So ``gymnasium.make("rigid_env/BlockReach-v0")`` needs this import first, in every process. The id
+    ``"rigid_env:rigid_env/BlockReach-v0"`` makes Gymnasium import the package, in workers, too. Versions of Gymnasium
+    that load plugins (up to 0.29) call this function through the entry point ``gymnasium.envs``.
 
-    Environments are named by strings: nothing of the engine is imported before `gymnasium.make`.
+    Environments are named by strings, so the engine is imported only by `gymnasium.make`.
     """
     for name, steps in MAX_EPISODE_STEPS.items():
         env_id = f"{NAMESPACE}/{name}-v0"
@@ -65,23 +65,23 @@ def _file_of(name: str) -> str:
 
 
 def register_task(id: str, task: type | str, **settings: Any) -> None:
-    """Register a task with Gymnasium: `gymnasium.make` and `make_vec` then find it under its id.
+    """Register a task with Gymnasium, so that `gymnasium.make` and `make_vec` find it under its id.
 
     Parameters
     ----------
     id : str
-        Such as ``mine/EdgeBalance-v0``.
+        Id such as ``mine/EdgeBalance-v0``.
     task : class of Task, or str
-        The class, or where it stands, ``module:Class``: workers that start afresh import it from there.
+        Class, or its name ``module:Class``, by which newly started worker processes can import it.
     settings
-        Arguments of the task, such as ``accuracy``, and of its environment, in place of their defaults.
+        Default arguments of the task, such as ``accuracy``, and of its environment.
 
     Raises
     ------
     TypeError
         An unknown setting, with the known ones, the nearest first.
     ValueError
-        It is no task.
+        `task` is no task.
     """
     from rigid_env.envs.making import check_settings, task_class
     from rigid_env.tasks.declaration_checks import checked_limit

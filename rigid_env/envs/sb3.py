@@ -1,4 +1,4 @@
-"""Adapter of the native batch for Stable-Baselines3: one call per step, not a loop over environments."""
+"""Adapter of the native batch for Stable-Baselines3, with one call per step instead of a loop over environments."""
 
 from __future__ import annotations
 
@@ -27,21 +27,20 @@ except ImportError:
 
 
 class RigidVecEnv(VecEnv):
-    """A `RigidVectorEnv` behind the interface that Stable-Baselines3 trains on.
+    """A `RigidVectorEnv` with the interface of Stable-Baselines3's vector environments.
 
-    Worlds start anew in the step in which their episode ends; the info of that step holds
-    ``terminal_observation``, ``TimeLimit.truncated``, the numbers of the task's infos, and, with `monitor`,
-    ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
-    The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
-    of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
+    A world restarts in the step in which its episode ends. The info of that step has ``terminal_observation``,
+    ``TimeLimit.truncated``, the numbers of the task's infos, and, with `monitor`, ``episode`` (return ``r``, length
+    ``l``, seconds since the start of training ``t``). Other infos are empty. `reset_infos` has the infos from the
+    starts of the running episodes, with their drawn values, such as ``mass`` and ``friction``.
 
     Parameters
     ----------
     vector_env : RigidVectorEnv
-        Made with ``autoreset_mode="SameStep"``.
+        Vector environment with ``autoreset_mode="SameStep"``.
     monitor : bool
-        Add the ``episode`` statistics, as SB3's `Monitor` would; `env_is_wrapped(Monitor)` is then True. Turn
-        off to use SB3's `VecMonitor`.
+        Add the ``episode`` statistics of SB3's `Monitor`; `env_is_wrapped(Monitor)` is then True. Set it to False to
+        use SB3's `VecMonitor`.
 
     Raises
     ------
@@ -67,7 +66,7 @@ class RigidVecEnv(VecEnv):
         self.metadata = vector_env.metadata
 
     def reset(self) -> NDArray[Any]:
-        """Start all worlds anew, with the seeds and options given since the last reset.
+        """Start new episodes in all worlds, with the seeds and options that were set since the last reset.
 
         Returns
         -------
@@ -88,7 +87,7 @@ class RigidVecEnv(VecEnv):
                 for i in rows:
                     starts[i] = self._row_of(infos, i)
         except BaseException:
-            if before is not None:  # the groups before the one that is refused have begun
+            if before is not None:  # groups before the refused one have started already
                 self.vector_env.set_state(before)
             raise
         self.reset_infos = starts
@@ -104,14 +103,14 @@ class RigidVecEnv(VecEnv):
         Parameters
         ----------
         options : dict, or list of dict, optional
-            One dict is that of `RigidVectorEnv.reset`, without ``reset_mask``, since all environments start: each value
-            is for all of them, or an array with a row for each. A list has a dict for each environment, with values for
-            this one; their keys may differ.
+            A dict is as of `RigidVectorEnv.reset`, without ``reset_mask``, since all environments start: a value is for
+            all of them, or an array with a row for each. A list has a dict for each environment, with its own
+            values; keys may differ.
 
         Raises
         ------
         ValueError
-            Something else, or another number of dicts than of environments.
+            `options` has another type, or the number of dicts is not that of environments.
         """
         if options is None or isinstance(options, Mapping):
             if options is not None and "reset_mask" in options:
@@ -133,7 +132,7 @@ class RigidVecEnv(VecEnv):
         self.set_options(None)
 
     def _option_groups(self) -> list[tuple[Sequence[int], dict[str, Any]]]:
-        """Environments that fix the same draws, with their options; each group needs one `reset` of the batch."""
+        """Group environments by the draws that they fix; each group and its options need one `reset` of the batch."""
         groups: dict[frozenset, list[int]] = {}
         for i, one in enumerate(self._options):
             groups.setdefault(frozenset(one), []).append(i)
@@ -146,7 +145,7 @@ class RigidVecEnv(VecEnv):
         return found
 
     def _stacked(self, key: str, rows: Sequence[int]) -> np.ndarray:
-        """Values of one option, with a row for each of these environments."""
+        """Values of the option `key` for the environments `rows`, as an array with a row for each."""
         values = [np.asarray(self._options[i][key]) for i in rows]
         for i, value in zip(rows, values):
             if value.shape != values[0].shape:
@@ -155,11 +154,11 @@ class RigidVecEnv(VecEnv):
         return np.stack(values)
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions (num_envs, 6) for `step_wait`."""
+        """Keep actions (num_envs, numbers) for `step_wait`."""
         self._actions = actions
 
     def step_wait(self) -> tuple[NDArray[Any], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """Step with the actions kept.
+        """Step all environments with the actions of `step_async`.
 
         Returns
         -------
@@ -197,7 +196,7 @@ class RigidVecEnv(VecEnv):
         return info
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
-        """One world's info at the start of its episode."""
+        """Info of one world at the start of its episode, taken from the infos of the batch."""
         keys = (*self._keys(), *self.vector_env.task.own_draws)
         return {key: infos[key][world].tolist() for key in keys}
 
@@ -207,17 +206,17 @@ class RigidVecEnv(VecEnv):
 
     @staticmethod
     def _of_world(values: np.ndarray, world: int) -> Any:
-        """One world's number, or a copy of its array."""
+        """Number of one world, or a copy of its array, from an array with a row for each world."""
         return values[world].item() if values.ndim == 1 else values[world].copy()
 
     def close(self) -> None:
         """Close the vector environment."""
         self.vector_env.close()
 
-    # --- one environment's attributes are every environment's ---------------------------------------------
+    # --- attributes and methods of single environments ----------------------------------------------------
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute of each world (`RigidVectorEnv.get_attr`), or of the vector environment, once per index."""
+        """Attribute of each chosen world (`RigidVectorEnv.get_attr`), or of the vector environment, once for each."""
         rows = list(self._get_indices(indices))
         try:
             values = self.vector_env.get_attr(attr_name)
@@ -239,9 +238,15 @@ class RigidVecEnv(VecEnv):
         self.vector_env.set_attr(attr_name, [value] * self.num_envs)
 
     def env_method(self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any) -> list[Any]:
-        """Call a method of the vector environment once, for all environments; its result, once per index.
+        """Call a method of the vector environment once, for all environments; the result is repeated for each index.
 
-        A method that looks at no environment (`goals.METHODS`) may be called for some of them.
+        `indices` may choose some of the environments only for a method that depends on no environment's state
+        (`goals.METHODS`). For other methods it must be None, or name all environments.
+
+        Raises
+        ------
+        ValueError
+            `indices` leaves out environments, and the method is another one.
         """
         if method_name not in METHODS:
             self._require_all("env_method", indices)
@@ -254,12 +259,12 @@ class RigidVecEnv(VecEnv):
             raise ValueError(f"{what} got indices {indices!r}; allowed is None: the environments are one batch")
 
     def env_is_wrapped(self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: Any = None) -> list[bool]:
-        """True for SB3's `Monitor` where this adapter does its work, else False."""
+        """True for SB3's `Monitor` if this adapter does its work, else False; one bool for each index."""
         is_wrapped = self.monitor and wrapper_class is Monitor
         return [is_wrapped for _ in self._get_indices(indices)]
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """A picture of each world, (height, width, 3) uint8."""
+        """Picture of each world, (height, width, 3) uint8; None if the render mode is not "rgb_array"."""
         if self.render_mode != "rgb_array":
             return [None] * self.num_envs
         return list(self.vector_env.render())  # type: ignore[arg-type]

@@ -209,7 +209,7 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
 
 
 def check_limit(value: int | str | None, limit: int | None) -> None:
-    """Refuse a limit of a batch beyond that of its task: Gymnasium cannot lengthen a single environment's, either."""
+    """Refuse a time limit of a batch above that of its scene; Gymnasium cannot raise a single environment's, either."""
     if limit is None or isinstance(value, str):
         return
     steps = episode_limit(value)

@@ -1,4 +1,4 @@
-"""Sources of observations: the numbers of a task, or pictures of its worlds."""
+"""Sources of observations: the numbers of a task's entries, or pictures of its worlds."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ ObsKind = Literal["state", "pixels"]
 """Kind of observation, one of `KINDS`."""
 
 Obs = TypeVar("Obs")
-"""Type of an observation: an array, or a dictionary of arrays where a task has goals."""
+"""Type of an observation: an array, or a dict of arrays for a task with goals."""
 
 
 @dataclass(frozen=True)
 class ObservationArguments:
-    """Arguments about what an environment tells; see `rigid_env.envs.env.RigidEnv`."""
+    """Arguments about observations and infos of an environment; see `rigid_env.envs.env.RigidEnv`."""
 
     obs: ObsKind = "state"
     obs_size: Sequence[int] = (84, 84)
@@ -37,7 +37,7 @@ class ObservationArguments:
 
 
 class StateSource:
-    """Source of observations that hold the numbers of a task's entries.
+    """Source of observations that are the numbers of a task's entries.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class StateSource:
     Attributes
     ----------
     space : gymnasium.spaces.Box
-        Of one world.
+        Space of one world's observation.
     """
 
     def __init__(self, task: Task):
@@ -54,22 +54,22 @@ class StateSource:
         self.space = spaces.Box(task.observed.low, task.observed.high, dtype=np.float32)
 
     def start(self, rows: np.ndarray) -> None:
-        """Observe worlds whose episodes begin."""
+        """Do nothing for worlds `rows` in which episodes begin: the task has observed them."""
 
     def step(self) -> None:
-        """Observe all worlds after a step."""
+        """Do nothing after a step: the task has observed all worlds."""
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Memory of the source by name, worlds first: none."""
+        """Arrays of the source that belong to a state: none."""
         return {}
 
     def one(self, world: int) -> np.ndarray:
-        """Observation of one world, a copy."""
+        """Copy of the observation of one world."""
         return self._task.obs[world].copy()
 
     def all(self) -> np.ndarray:
-        """Observations of all worlds, a copy."""
+        """Copy of the observations of all worlds."""
         return self._task.obs.copy()
 
 
@@ -82,13 +82,13 @@ class PixelSource:
     size : (2,) int
         Height and width [px].
     stack : int
-        Pictures in one observation, one for each of the last control steps, the newest last; at the start of an episode
-        all show the start.
+        Pictures in one observation, one for each of the last control steps, the newest last. At the start of an episode
+        all of them show the start.
 
     Attributes
     ----------
     space : gymnasium.spaces.Box
-        (height, width, 3 * stack) uint8.
+        Space of one world's observation: (height, width, 3 * stack) uint8.
 
     Raises
     ------
@@ -111,7 +111,7 @@ class PixelSource:
         self._pictures = np.zeros((task.worlds, self.stack, height, width, 3), dtype=np.uint8)
 
     def start(self, rows: np.ndarray) -> None:
-        """Draw worlds whose episodes begin."""
+        """Draw the worlds `rows` in which episodes begin, and fill their stacks of pictures."""
         for world in rows:
             self._draw(world)
             self._pictures[world, :-1] = self._pictures[world, -1]
@@ -124,18 +124,18 @@ class PixelSource:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Memory of the source by name, worlds first: the last pictures."""
+        """Arrays of the source that belong to a state, by name, worlds first: the last pictures."""
         return {"pictures": self._pictures}
 
     def _draw(self, world: int) -> None:
         self._observer.observe(frame_of(self._task, world, arrows=False), self._pictures[world, -1])
 
     def one(self, world: int) -> np.ndarray:
-        """Observation of one world, a copy."""
+        """Copy of the observation of one world."""
         return np.concatenate(tuple(self._pictures[world]), axis=-1)
 
     def all(self) -> np.ndarray:
-        """Observations of all worlds, a copy."""
+        """Copy of the observations of all worlds."""
         return np.concatenate(tuple(self._pictures.swapaxes(0, 1)), axis=-1)
 
 

@@ -24,7 +24,7 @@ class TaskEnv(RigidEnv[Any]):
     Parameters
     ----------
     task : class of Task, or str
-        The class, or where it stands: ``module:Class``.
+        Class, or its name ``module:Class``.
     render_mode, width, height, obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `RigidEnv`.
     settings
@@ -35,7 +35,7 @@ class TaskEnv(RigidEnv[Any]):
     TypeError
         An unknown argument, with the known ones, the nearest first.
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     def __init__(
@@ -64,8 +64,9 @@ class TaskVectorEnv(RigidVectorEnv[Any]):
     Parameters
     ----------
     num_envs : int
+        Number of worlds.
     task : class of Task, or str
-        The class, or where it stands: ``module:Class``.
+        Class, or its name ``module:Class``.
     autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
     contacts, impacts
         As of `RigidVectorEnv`.
@@ -77,7 +78,7 @@ class TaskVectorEnv(RigidVectorEnv[Any]):
     TypeError
         An unknown argument, with the known ones, the nearest first.
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     def __init__(

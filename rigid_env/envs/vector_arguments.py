@@ -10,14 +10,14 @@ from gymnasium.vector import AutoresetMode
 from rigid_env.tasks.declaration_checks import checked_limit
 
 Autoreset = Literal["NextStep", "SameStep", "Disabled"]
-"""Values of `AutoresetMode`."""
+"""Type of an argument: names of the modes in Gymnasium's `AutoresetMode`."""
 
 NO_LIMIT = -1
 """Value with which `gymnasium.make` turns the time limit off; its None means the registered limit."""
 
 
 def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    """Return the autoreset mode, given itself or by name."""
+    """Return the autoreset mode, which is given as a mode or by its name; a ValueError for anything else."""
     try:
         return AutoresetMode(mode)
     except ValueError:
@@ -26,13 +26,13 @@ def autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def episode_limit(value) -> int | None:
-    """Number of control steps of an episode; None and `gymnasium.make`'s -1 mean no limit."""
+    """Check a limit of control steps per episode, and return it; None and `gymnasium.make`'s -1 give None, no limit."""
     is_off = isinstance(value, (int, np.integer)) and value == NO_LIMIT
     return None if is_off else checked_limit(value, "max_episode_steps")
 
 
 def reset_mask(options: dict[str, Any], num_envs: int) -> np.ndarray:
-    """Worlds to reset, (num_envs,) bool; removes the mask from `options`."""
+    """Take the mask of the worlds to reset, (num_envs,) bool, out of `options`; without a mask all worlds."""
     mask = options.pop("reset_mask", None)
     if mask is None:
         return np.ones(num_envs, dtype=np.bool_)
@@ -44,7 +44,7 @@ def reset_mask(options: dict[str, Any], num_envs: int) -> np.ndarray:
 
 
 def seed_list(seed, num_envs: int) -> list[int | None]:
-    """One seed or None for each world."""
+    """Seeds of all worlds, an int or None each: an int s gives world i the seed s + i, a list has one for each."""
     if seed is None:
         return [None] * num_envs
     if _is_seed(seed):

@@ -1,4 +1,4 @@
-"""The native vector environments: a batch of worlds behind Gymnasium's `VectorEnv`, stepped in one call."""
+"""Native vector environment: a batch of worlds with the interface of Gymnasium's `VectorEnv`, stepped in one call."""
 
 from __future__ import annotations
 
@@ -42,31 +42,31 @@ class _Arguments(VectorArguments, TaskArgument):
 class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
-    World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.
+    World i has the same bits as a single environment with the same seed, for any number of worlds.
 
     Parameters
     ----------
     task : Task
-        Of `num_envs` worlds.
+        Task with a batch of worlds.
     autoreset_mode : AutoresetMode or str
         ``NextStep`` (default), ``SameStep`` or ``Disabled``.
     max_episode_steps : int or None
-        Control steps after which an episode is truncated; None or -1: never. The default is the task's number.
+        Control steps after which an episode is truncated; None or -1: never. The default is that of the task.
     render_mode : {"rgb_array", "human"} or None
         ``human`` shows world 0.
     width, height : int
-        Of one world's picture [px].
+        Size of the picture of one world that `render` returns [px].
     obs, obs_size, obs_stack, contacts, impacts, camera, arrows
         As of `rigid_env.envs.env.RigidEnv`.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     task: Task
-    _view: Any = None  # a `View`; Gymnasium closes batches, too, whose construction ended with an error
+    _view: Any = None  # a `View`; None if the constructor has failed, after which Gymnasium still calls `close`
 
     @takes(_Arguments)
     def __init__(self, given: _Arguments) -> None:
@@ -93,12 +93,12 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator | None, ...]:  # type: ignore[override]
-        """One generator per world."""
+        """Random generators, one for each world; None before its first reset."""
         return tuple(self.task.generators)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The seed of each world's generator; -1 before the first reset."""
+        """Seeds of the worlds' generators; -1 before the first reset."""
         return tuple(self._seeds)
 
     # --- Gymnasium's two calls ----------------------------------------------------------------------------
@@ -112,16 +112,16 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         Parameters
         ----------
         seed : int, list of int or None, optional
-            An int s gives world i the seed s + i; None lets a generator go on.
+            An int s gives world i the seed s + i. None continues with the present generator.
         options : dict, optional
-            ``reset_mask`` (num_envs,) bool: the worlds to reset, the others stay as they are. The other keys
-            fix what is otherwise drawn, for all worlds reset or for each of them; see the single environment.
+            ``reset_mask`` (num_envs,) bool: worlds to reset; the others stay as they are. Other keys fix values that
+            are otherwise drawn, one for all worlds to reset or one for each; see the single environment.
 
         Returns
         -------
         observations : (num_envs, entries) float32
         infos : dict of arrays
-            With what was drawn for the new episodes, by name, except what `effects` take the place of.
+            As of `step`, with the drawn values of the new episodes, by name, without parameters that `effects` fix.
 
         Raises
         ------
@@ -160,8 +160,8 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         rewards : (num_envs,) float64
         terminations, truncations : (num_envs,) bool
         infos : dict of arrays
-            With ``final_obs`` and ``final_info`` of the episodes that ended, in mode ``SameStep``; with the parameters
-            of the episodes that begin in this step, as `reset` tells them, in both modes that start anew.
+            In mode ``SameStep`` it has ``final_obs`` and ``final_info`` of the episodes that ended. In both modes with
+            automatic resets it has the drawn values of the episodes that begin in this step, like that of `reset`.
 
         Raises
         ------
@@ -180,11 +180,11 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             generator.bit_generator.state = state
         if undo_memory is None:
             return self._conclude()
-        with undo_on_error(self.task.undo_step, undo_memory):  # an error of a start, or of a picture
+        with undo_on_error(self.task.undo_step, undo_memory):  # starting an episode or drawing a picture may fail
             return self._conclude()
 
     def _conclude(self) -> Step[Obs]:
-        """Observe a step that was taken, and start episodes after those that ended."""
+        """Observe the worlds after a step, and start new episodes where the mode of automatic resets requires it."""
         task = self.task
         self._source.step()
         rewards = task.outcome[:, col.REWARD].copy()
@@ -219,7 +219,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         Parameters
         ----------
         worlds : (k,) array_like of int, or mask, optional
-            Worlds meant; None: all.
+            Worlds whose state is copied; None: all.
 
         Returns
         -------
@@ -237,7 +237,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     def set_state(
         self, state: TaskState, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
     ) -> None:
-        """Continue worlds from a state of this task, of an environment or of any batch.
+        """Continue worlds from a state of this task, which a single environment or a batch has made.
 
         Parameters
         ----------
@@ -245,14 +245,14 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         worlds : (k,) array_like of int, or mask, optional
             Worlds that change; None: all.
         source : (k,) array_like of int, or int, optional
-            Worlds of the state from which these go on; an int is for all. None: the state has one world, for all of
+            Worlds of the state from which they continue; an int is for all. None: the state has one world, for all of
             them, or k worlds, in this order.
 
         Raises
         ------
         ValueError
-            It is no state, one of another task or of other settings (`TaskState.settings`; both values are told), or
-            indices are out of range. Nothing has changed then.
+            An object that is no state, a state of another task or of other settings (`TaskState.settings`), or indices
+            out of range. Nothing has changed then.
         """
         chosen, sources = reinstate(self.task, self._arrays(), state, worlds, source)
         for world, of in zip(chosen.tolist(), sources.tolist()):
@@ -261,7 +261,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
     def _arrays(self) -> dict[str, np.ndarray]:
         return {"waiting": self._waiting, "ended": self._ended, **self._source.arrays}
 
-    # --- parts of these -----------------------------------------------------------------------------------
+    # --- parts of the methods above -----------------------------------------------------------------------
 
     def _check_open(self, call: str) -> None:
         if self.closed:
@@ -278,10 +278,10 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             )
 
     def _generators_of_ended(self) -> list[tuple[Any, Any]]:
-        """Random generators of worlds whose episodes ended, each with its state.
+        """Random generators of the worlds whose episodes have ended, each with its state, which the step will restore.
 
-        In mode ``NextStep`` ended worlds move in the step that restarts them. A disturbance due in that step must not
-        use numbers of the next episode.
+        In mode ``NextStep`` ended worlds still move in the step that restarts them. A disturbance due in that step must
+        not use random numbers of the next episode.
         """
         if self.task.disturbed is None:
             return []
@@ -297,7 +297,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         return undo
 
     def _remember(self) -> Undo | None:
-        """Copy the environment's own memory, where code of a user may end with an error."""
+        """Copy the environment's own arrays, if a user's code may fail; returns a function that restores them."""
         if not self.task.may_fail:
             return None
         ended, pictures = self._ended, {name: array.copy() for name, array in self._source.arrays.items()}
@@ -310,7 +310,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         return undo
 
     def _begin(self, rows: np.ndarray, options: dict[str, Any]) -> None:
-        """Start episodes; after an error nothing has changed."""
+        """Start episodes in worlds `rows`; after an error nothing has changed."""
         undo_task = remember(self.task, rows) if self.task.may_fail and self._source.arrays else None
         with undo_on_error(undo_task, self._remember()):
             self.task.start(rows, options)

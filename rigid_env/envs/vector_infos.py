@@ -1,4 +1,4 @@
-"""Infos of the native vector environments: arrays with their masks, as `VectorEnv._add_info` makes them."""
+"""Infos of native vector environments: arrays with masks, in the form of Gymnasium's `VectorEnv._add_info`."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from rigid_env.tasks import layout as col
 
 
 def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
-    """Keys of every info, of a step and of a start."""
+    """Keys of the infos of every step and start."""
     return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else contacts.keys))
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """Infos of the last step or start for the worlds of `mask` (worlds,) bool; zero in the others."""
+    """Infos of the last step or start, with zeros for worlds outside of `mask` (worlds,) bool."""
     outcome = task.outcome
     infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
     for column, name in enumerate(task.info_names, col.INFO):
@@ -35,7 +35,7 @@ def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInf
 
 
 def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
-    """Add the values drawn for episodes that begin in the worlds `rows` (n,); zero in the others."""
+    """Add the drawn values of episodes that begin in the worlds `rows` (n,) to infos, with zeros for other worlds."""
     mask = np.zeros(task.worlds, dtype=np.bool_)
     mask[rows] = True
     for name in task.own_draws:
@@ -46,7 +46,7 @@ def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
 
 
 def of_ended(task: Task, source, mask: np.ndarray, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """`final_obs` and `final_info` of episodes that end where `mask` is True, taken before they restart."""
+    """Make `final_obs` and `final_info` of the episodes that end where `mask` is True, before they restart."""
     final_obs = np.full(task.worlds, None, dtype=object)
     for i in np.flatnonzero(mask):
         final_obs[i] = source.one(i)

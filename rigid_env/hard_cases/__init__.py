@@ -1,4 +1,5 @@
-"""The hard cases: situations in which rigid-body simulators break, each with a known outcome (docs/hard-cases.md).
+"""Hard cases: situations in which rigid-body simulators break, each with a known outcome (docs/hard-cases.md).
 
-`case` says what a case is, `registry` finds them, `cases` holds them by subject. `rigid_env.lab.hard_cases` runs them.
+`case` defines the classes, `cases` has the cases by subject, and `registry` finds them. `rigid_env.lab.hard_cases` runs
+them.
 """

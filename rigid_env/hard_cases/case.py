@@ -1,4 +1,4 @@
-"""Hard cases: each has a known outcome, and a run that compares the engine with it."""
+"""Classes of hard cases: a case with a known outcome, the setting that it is run at, and the checks of its result."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ AT_MOST, AT_LEAST, WITHIN = "at most", "at least", "within"
 
 
 class UnsupportedError(Exception):
-    """Error of a case that cannot be expressed at a setting; the message says why. It never counts as a pass."""
+    """Error of a case that cannot run at a setting; the message says why. It never counts as a pass."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One number of an outcome, and the condition that it must obey.
+    """Measured number of a hard case, and the condition that it must satisfy.
 
     Parameters
     ----------
     what : str
-        What was measured: "drift of the apex, 10,000 bounces".
+        Description of the number, such as "drift of the apex, 10,000 bounces".
     value : float
-        What came out. Where a yes or no is asked: a count of those that went wrong, `at most` 0.
+        Measured value. For a condition of yes or no it is the number of violations, which must be `at most` 0.
     limit : float
         ``at most``: value <= limit. ``at least``: value >= limit. ``within``: |value - expected| <= limit.
     unit : str
-        Of `value` and `limit`; empty for a pure number.
+        Unit of `value`, `limit` and `expected`; empty for a pure number.
     kind : str
         `AT_MOST`, `AT_LEAST` or `WITHIN`.
     expected : float
-        For ``within``.
+        Known outcome, for ``within``.
     """
 
     what: str
@@ -55,21 +55,22 @@ class Check:
 
     @property
     def passes(self) -> bool:
-        """True if the value obeys its condition; NaN never does."""
+        """True if the value satisfies its condition; NaN never does."""
         if self.kind == AT_LEAST:
             return self.value >= self.limit
         return self.distance <= self.limit
 
     @property
     def distance(self) -> float:
-        """Number that is compared with the limit: the distance from the expected value, or the value itself."""
+        """Number compared with the limit: the distance from the expected value for ``within``, else the value."""
         return abs(self.value - self.expected) if self.kind == WITHIN else self.value
 
     @property
     def margin(self) -> float:
-        """Unused share of the limit: 1 for no error, 0 at the limit, negative beyond it; -inf if not finite.
+        """Unused share of the limit: 1 without an error, 0 at the limit, negative beyond it, -inf for NaN or infinity.
 
-        For ``at least``: by how much of the limit the value is above it. A limit of 0 leaves 1 (met) or -inf.
+        For ``at least``: excess of the value over the limit, as a share of the limit. A limit of 0 gives 1 if it is
+        met, else -inf.
         """
         if not math.isfinite(self.distance):
             return -math.inf
@@ -80,35 +81,35 @@ class Check:
 
 
 def within(what: str, value: float, expected: float, limit: float, unit: str = "") -> Check:
-    """|value - expected| <= limit."""
+    """Make the check |value - expected| <= limit."""
     return Check(what, value, limit, unit, WITHIN, expected)
 
 
 def at_least(what: str, value: float, limit: float, unit: str = "") -> Check:
-    """Value >= limit."""
+    """Make the check value >= limit."""
     return Check(what, value, limit, unit, AT_LEAST)
 
 
 def none_of(what: str, wrong: int | bool) -> Check:
-    """Check that a count of faults, `wrong`, is 0."""
+    """Make the check that `wrong`, a number of violations or a flag, is 0."""
     return Check(what, float(wrong), 0.0)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Accuracy, step and engine with which a case is run.
+    """Accuracy, step and engine at which a hard case is run.
 
     Parameters
     ----------
     accuracy : str or physics.Accuracy
-        A preset's name, or knobs of one's own.
+        Name of a preset, or all settings.
     dt : float
         Step [s].
     is_thorough : bool
-        False: a shorter run of the same kind (for tests); the limits are derived for the length that is run.
+        False: a shorter run of the same kind, for tests; a case derives its limits for the length of its run.
     maker : callable, optional
-        (scene, dt) -> what looks like a `physics.World` of one world (pos, quat, linvel, angvel, step, time): another
-        engine's. None: ours.
+        Function (scene, dt) that makes a world of another engine. It behaves like a `physics.World` of one world: pos,
+        quat, linvel, angvel, step, time. None: our engine.
     """
 
     accuracy: Preset | physics.Accuracy = "balanced"
@@ -117,12 +118,12 @@ class Setting:
     maker: Callable[[physics.Scene, float], object] | None = None
 
     def world(self, scene: physics.Scene, worlds: int = 1) -> physics.World:
-        """A world of the scene at this setting.
+        """Make worlds of a scene at this setting.
 
         Raises
         ------
         UnsupportedError
-            There is no plan for this scene at this accuracy, or the other engine cannot express it.
+            Our engine has no plan for this scene at this accuracy, or the other engine cannot express the scene.
         """
         if self.maker is not None:
             return self.maker(scene, self.dt)
@@ -134,15 +135,15 @@ class Setting:
 
     @property
     def is_event_driven(self) -> bool:
-        """True if events are located, so that outcomes do not depend on the step.
+        """True if our engine locates events, so that outcomes do not depend on the step.
 
-        Bodies that touch each other are stepped to an error then, which is dear: quick runs are smaller.
+        Bodies that touch each other are then integrated with error control, which takes long: quick runs are smaller.
         """
         return self.maker is None and resolve(self.accuracy).scheme == "events"
 
     @property
     def is_ours(self) -> bool:
-        """True for our own engine, which has reports, contact forces and parameters to check."""
+        """True for our engine, which has reports, contact forces and parameters to check."""
         return self.maker is None
 
     @property
@@ -152,40 +153,40 @@ class Setting:
 
     @property
     def slop(self) -> float:
-        """`Accuracy.slop`, the gap that counts as none, in bounding radii; the same for other engines."""
+        """`Accuracy.slop`, the gap that counts as touching, in bounding radii; the same for other engines."""
         return resolve(self.accuracy).slop
 
     def steps(self, duration: float) -> int:
-        """Whole steps that take at least `duration` [s], to rounding."""
+        """Smallest number of steps that take at least `duration` [s], up to rounding."""
         return max(1, math.ceil(duration / self.dt * (1 - 4 * np.finfo(float).eps)))
 
     def pick(self, thorough, quick):
-        """Return the first value in a thorough run, else the second."""
+        """Return `thorough` in a thorough run, else `quick`."""
         return thorough if self.is_thorough else quick
 
 
 @dataclass(frozen=True)
 class Case:
-    """A hard case.
+    """Hard case: a scene with a known outcome, and the function that runs and checks it.
 
     Parameters
     ----------
     number : int
-        In the list of hard cases.
+        Number in the list of hard cases.
     name : str
-        For the command line: lower case, with hyphens.
+        Name for the command line: lower case, with hyphens.
     title : str
-        What it is, a few words.
+        Short description of the situation.
     must : str
-        What must come out, one line with the closed form.
+        Known outcome in one line, with its closed form.
     run : callable
-        Setting -> checks. Its docstring derives outcome and tolerance and gives the source. It may raise
-        `UnsupportedError`.
+        Function from a `Setting` to checks. Its docstring derives outcome and tolerance and gives the source. It may
+        raise `UnsupportedError`.
     peers : bool
-        Whether `run` looks at nothing but state, time and `step`, so that other engines can be held against it.
-    faults : mapping
-        Name of a preset -> why the case does not hold there at a step of 10 ms, as found. It is run all the same, and
-        shown as failing; a test expects that it fails, and fails itself when it does not any more.
+        Whether `run` uses only state, time and `step`, so that other engines can run the case, too.
+    faults : mapping of str to str
+        Presets at which the case is known to fail at a step of 10 ms, with the reason. The case is run anyway and shown
+        as failing. A test expects the failure, and fails itself once the case passes.
     """
 
     number: int

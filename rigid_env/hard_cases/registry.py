@@ -1,4 +1,4 @@
-"""All hard cases in the order of their numbers, and a search by number or name."""
+"""List of all hard cases in the order of their numbers, and a search by number or name."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from importlib import import_module
 from physics.keywords import nearest_first
 from rigid_env.hard_cases.case import Case
 
-# Each has a tuple CASES.
+# Modules of `rigid_env.hard_cases.cases`; each has a tuple CASES.
 MODULES = (
     "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
     "chains", "stiff", "turning", "letting_go", "random_scenes", "company",
@@ -20,12 +20,12 @@ CASES: tuple[Case, ...] = tuple(sorted(_GATHERED, key=lambda case: case.number))
 
 
 def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:
-    """Cases of these names or numbers, in the order of the list; all if none is named.
+    """Find cases by names or numbers; returns them in the order of the list, or all cases if none is named.
 
     Raises
     ------
     ValueError
-        There is no such case.
+        There is no case with such a name or number.
     """
     known = {key: case for case in CASES for key in (case.name, str(case.number))}
     for name in wanted:

@@ -1,1 +1,1 @@
-"""Instruments that users run: speed, accuracy, hard cases, measured tosses, demonstrations, replays."""
+"""Instruments for users: measure speed and accuracy, run hard cases, replay measured tosses, draw demonstrations."""

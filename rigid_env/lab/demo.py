@@ -1,4 +1,4 @@
-"""One run of a scene for `rigid-env demo` and `rigid-env run`: its numbers, its picture and its animation."""
+"""Run of one scene for `rigid-env demo` and `rigid-env run`, with its numbers, picture and animation."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from rigid_env.rendering import Frame, Renderer
 from rigid_env.rendering.picture import stroboscope, without_bodies, world_frame, write_gif, write_png
 from rigid_env.rendering.staging import CHOSEN, Shot, Stage
 
-SAMPLE_DT = 0.01  # step, and time between samples, where none is given [s]
+SAMPLE_DT = 0.01  # default step, which is also the time between samples [s]
 FRAME_TIME = 0.04  # least time between pictures of the GIF, which counts in hundredths of a second [s]
 GIF_TICK = 0.01  # [s]
-LARGEST_GIF = 600  # pictures; a longer motion is shown faster than it is
+LARGEST_GIF = 600  # most pictures; a longer motion is played faster
 PICTURE_SIZE = (960, 600)  # [px]
 GIF_SIZE = (640, 400)  # [px]
-STROBES = 7  # positions in the picture
-SEEN_SPEED = 0.05  # below which nothing seems to move [m/s, rad/s]
-REST_SPEED = 1e-6  # below which a body is at rest [m/s, rad/s]
+STROBES = 7  # positions of each body in the stroboscopic picture
+SEEN_SPEED = 0.05  # speed below which a body does not seem to move [m/s, rad/s]
+REST_SPEED = 1e-6  # speed below which a body is at rest [m/s, rad/s]
 
 
 class Demo:
-    """One scene, simulated for a while.
+    """One scene, simulated for a given time.
 
     Parameters
     ----------
     name : str
-        Of a canonical scene, see `physics.scenes`, or of `scene`.
+        Name of a canonical scene, see `physics.scenes`, or a name for `scene`.
     duration : float
-        Rounded to whole steps [s].
+        Simulated time, rounded to whole steps [s].
     accuracy : str
-        Preset.
+        Name of a preset.
     scene : physics.Scene, optional
-        Instead of the canonical one.
+        Scene that is simulated instead of the canonical one.
     dt : float
-        Step, and time between samples [s].
+        Step, which is also the time between samples [s].
 
     Raises
     ------
@@ -61,7 +61,7 @@ class Demo:
         self._go_to(self._sample_count)
 
     def _go_to(self, sample: int) -> None:
-        """Advance the world to a sample of the trajectory, with the same steps."""
+        """Bring the world to the state of a sample of the trajectory, by repeating the same steps."""
         if sample < self._sample:
             self.world.restore(self.start)
             self._sample = 0
@@ -72,7 +72,7 @@ class Demo:
     # --- numbers -------------------------------------------------------------------------------------------
 
     def events(self) -> list[dict]:
-        """List the events; equal ones at the same time are counted."""
+        """Events of the run as dicts; equal events at the same time are joined, with their number under `count`."""
         found: list[dict] = []
         for event in self.trajectory.events:
             content = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(event).items()}
@@ -84,7 +84,7 @@ class Demo:
         return found
 
     def summary(self) -> dict:
-        """All printed numbers, ready for JSON."""
+        """All numbers that the commands print, as a dict for JSON."""
         trajectory, world = self.trajectory, self.world
         points, forces = world.contacts()
         energy = trajectory.energy.sum(axis=1)
@@ -132,7 +132,7 @@ class Demo:
 
     @property
     def frame_count(self) -> int:
-        """Pictures of the GIF."""
+        """Number of pictures in the GIF."""
         return math.floor(self.duration / self.frame_time + 1e-9) + 1
 
     @property
@@ -141,14 +141,14 @@ class Demo:
         return 1.0 if self.duration <= LARGEST_GIF * FRAME_TIME else self.frame_time / FRAME_TIME
 
     def write_picture(self, path: Path, tick: Callable[[], None] = lambda: None, shot: Shot = CHOSEN) -> None:
-        """Write a PNG or a GIF, by the ending of its name; `tick` is called for each picture of a GIF."""
+        """Write a PNG or a GIF, by the ending of `path`; `tick` is called for each picture of a GIF."""
         if path.suffix.lower() == ".gif":
             self.write_gif(path, tick, shot)
         else:
             self.write_png(path, shot)
 
     def write_gif(self, path: Path, tick: Callable[[], None], shot: Shot = CHOSEN) -> None:
-        """Draw and write the animation; `tick` is called once per picture."""
+        """Draw and write the animation as a GIF; `tick` is called for each picture."""
         stage = self._stage()
         renderer = Renderer(*GIF_SIZE, camera=stage.camera(shot), bounds=stage.bounds)
         pictures = []
@@ -160,7 +160,7 @@ class Demo:
         write_gif(path, pictures, self.speed / self.frame_time)
 
     def write_png(self, path: Path, shot: Shot = CHOSEN) -> None:
-        """Draw and write the stroboscopic picture: earlier positions of the bodies, and the last one."""
+        """Draw and write the stroboscopic picture as a PNG: earlier positions of the bodies, and the last one."""
         stage = self._stage()
         renderer = Renderer(*PICTURE_SIZE, camera=stage.camera(shot), bounds=stage.bounds)
         pictures = []
@@ -176,7 +176,7 @@ class Demo:
         renderer.close()
 
     def _last_motion(self) -> int:
-        """Last sample at which a body still moved visibly."""
+        """Index of the last sample at which a body still moved visibly."""
         speed = np.maximum(np.abs(self.trajectory.linvel), np.abs(self.trajectory.angvel)).max(axis=(1, 2))
         moving = np.flatnonzero(speed > SEEN_SPEED)
         return int(moving[-1]) if len(moving) else 0

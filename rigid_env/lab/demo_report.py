@@ -1,4 +1,4 @@
-"""Report a run of a scene in words: events, energy, final places of the bodies, and quality of the solves."""
+"""Print the result of a run: events, energy, final state of the bodies, and quality of the contact solutions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from rigid_env.lab.demo import Demo
 from rigid_env.terminal import Column, Table, number_columns, say
 
 SHOWN_EVENTS = 24
-LAST_EVENTS = 8  # of these
-FEW = 8  # bodies, and contact points, that are printed one by one
+LAST_EVENTS = 8  # of the shown events, those from the end of the run
+FEW = 8  # largest number of bodies, or of contact points, that are printed one by one
 QUANTITIES = (("pos", "m"), ("quat", ""), ("linvel", "m/s"), ("angvel", "rad/s"))
 AXES = "x", "y", "z"
 
 
 def show(demo: Demo, summary: dict, console: Console) -> None:
-    """Print a run and its `Demo.summary`."""
+    """Print the result of a run, from its `Demo.summary`."""
     title = f", accuracy {demo.accuracy}, {demo.duration:g} s"
     console.print(Text.assemble((demo.name, "bold"), title))
     kinds = [type(body).__name__ for body in demo.scene.bodies]
@@ -42,7 +42,10 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
 
 
 def event_table(events: list[dict], names: list[str]) -> Table:
-    """Table of the first events; `names` are those of the bodies, or their classes."""
+    """Table of events, the first and the last ones if there are many.
+
+    `events` are dicts of `Demo.events`; `names` has the name or the class of each body.
+    """
     columns = [*number_columns("time [s]"), Column("what"), Column("body"), Column("with")]
     more = len(events) - SHOWN_EVENTS
     caption = f"{more} more are left out; --json has all" if more > 0 else ""
@@ -66,7 +69,7 @@ def _name_of(body: int, names: list[str]) -> str:
 
 
 def _partner(event: dict, names: list[str]) -> str:
-    """Wall or other body of an event."""
+    """Name of the wall or the other body of an event."""
     return f"wall {event['wall']}" if event["wall"] >= 0 else _name_of(event["other"], names)
 
 
@@ -91,7 +94,7 @@ def _body_table(final: dict, names: list[str]) -> Table:
 
 
 def _summarise(final: dict, kinds: list[str], names: list[str], console: Console) -> None:
-    """Print ranges instead of a row for each body, and the fastest bodies."""
+    """Print ranges of positions and the fastest bodies, instead of a row for each body."""
     counts = {kind: kinds.count(kind) for kind in dict.fromkeys(kinds)}
     say(console, "bodies", ", ".join(f"{count} {kind}" for kind, count in counts.items()))
     pos = np.array(final["pos"])
@@ -115,5 +118,5 @@ def _show_contacts(contacts: dict, console: Console) -> None:
 
 
 def _numbers(values) -> str:
-    """Numbers with four decimals, without negative zeros."""
+    """Text of numbers with four decimals and commas, without negative zeros."""
     return ", ".join(f"{round(value, 4) + 0.0:.4f}" for value in values)

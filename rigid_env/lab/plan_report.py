@@ -1,4 +1,4 @@
-"""Table of a plan in a terminal, for `rigid-env explain`."""
+"""Table of a plan for a terminal, for `rigid-env explain`."""
 
 from __future__ import annotations
 

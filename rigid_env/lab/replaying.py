@@ -1,4 +1,4 @@
-"""Command ``rigid-env replay``: take the steps of a recording again, one by one."""
+"""Command ``rigid-env replay``: repeats the steps of a recording, and prints whether they are the same."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from physics import Replay, Status
 from physics.io.recording import origin
 from rigid_env.terminal import Table, number_columns, say
 
-# Rows of the table where a recording is long: its last steps, in which what it was kept for happens.
+# Most rows of the table; of a longer recording it shows the last steps, which led to the reason for keeping it.
 LAST_ROWS = 20
 
 
 def summary(replay: Replay) -> dict:
-    """Numbers of the replay, ready for JSON."""
+    """Numbers of a replay as a dict for JSON."""
     recording, first = replay.recording, replay.first_difference
     return {
         "reason": recording.reason,
@@ -45,7 +45,7 @@ def _row(replay: Replay, k: int) -> dict:
 
 
 def show(content: dict, console: Console) -> None:
-    """Print a `summary`."""
+    """Print a replay from its `summary`."""
     say(console, "kept", content["reason"])
     say(console, "scene", f"{content['bodies']} bodies, {content['steps']} steps")
     rows, shown = content["rows"], _shown(content["rows"])
@@ -56,7 +56,7 @@ def show(content: dict, console: Console) -> None:
 
 
 def make_table(rows: list[dict], shown: list[int]) -> Table:
-    """The rows of a `summary` with these numbers."""
+    """Table of those rows of a `summary` whose indices are in `shown`."""
     names = "step", "t [s]", "status", "depth [m]", "residual", "impacts", "energy [J]", "same bits"
     table = Table(number_columns(*names))
     for k in shown:
@@ -69,13 +69,13 @@ def make_table(rows: list[dict], shown: list[int]) -> Table:
 
 
 def _shown(rows: list[dict]) -> list[int]:
-    """Row numbers that a table shows."""
+    """Indices of the rows that the table shows: the last ones, and those with a problem."""
     last = len(rows) - LAST_ROWS
     return [k for k, row in enumerate(rows) if k >= last or row["status"] not in ("OK", "UNCONVERGED")]
 
 
 def _verdict(content: dict) -> str:
-    """Outcome of the replay in words."""
+    """Text of the outcome of a replay."""
     if content["is_identical"]:
         return "bit for bit as recorded"
     ours, theirs = content["replayed_with"], content["recorded_with"]

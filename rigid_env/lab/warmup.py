@@ -1,4 +1,4 @@
-"""Command `rigid-env warmup`: take one step of environments and scenes, to compile their kernels."""
+"""Command `rigid-env warmup`: takes one step of environments and scenes, which compiles their kernels."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from rigid_env.lab.measure.environments import environment_ids
 from rigid_env.tasks.scene_source import SCENE_FILES, find_scene
 
 ACCURACIES = ("balanced", "fast")
-FIRST_SCENE = "drop"  # the three-wall box: at all of `ACCURACIES`, the other scenes at the first
+FIRST_SCENE = "drop"  # the three-wall box, compiled at all of `ACCURACIES`; other scenes only at the first of them
 
 
 @dataclass(frozen=True)
 class Job:
-    """One step of something, and a name for it."""
+    """One step of an environment or a scene, as a function with a name."""
 
     name: str
     accuracy: str
@@ -33,15 +33,16 @@ class Job:
 
 @dataclass(frozen=True)
 class Warmed:
-    """Time of a job.
+    """Result of a job.
 
     Attributes
     ----------
     name, accuracy : str
-        Of the job.
+        Name and accuracy of the job.
     seconds : float
+        Time that it took [s].
     compiled : int
-        Kernels that were compiled for it; 0 if all came from the cache.
+        Number of kernels that it compiled; 0 if all came from the cache.
     """
 
     name: str
@@ -50,12 +51,12 @@ class Warmed:
     compiled: int
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Result as a dict for JSON."""
         return asdict(self)
 
 
 def jobs() -> list[Job]:
-    """List the jobs worth compiling ahead: environments, the three-wall box, then the other canonical scenes."""
+    """Default jobs: environments, the three-wall box, then the canonical scenes that need other kernels."""
     found = [job for accuracy in ACCURACIES for job in _environment_jobs(accuracy)]
     seen: set[tuple] = set()
     names = [FIRST_SCENE, *(name for name in scenes.SCENES if name != FIRST_SCENE)]
@@ -70,7 +71,7 @@ def jobs() -> list[Job]:
 
 
 def jobs_of(names: Sequence[str], accuracies: Sequence[str]) -> list[Job]:
-    """List the jobs of environments, scenes and scene files, by name, at each of the accuracies.
+    """Jobs for the environments, scenes and scene files of these names, at each of the accuracies.
 
     Raises
     ------
@@ -91,7 +92,7 @@ def jobs_of(names: Sequence[str], accuracies: Sequence[str]) -> list[Job]:
 
 
 def warm(todo: list[Job]) -> Iterator[Warmed]:
-    """Run jobs one after the other, and yield the time of each."""
+    """Run jobs one after the other, and yield the result of each."""
     for job in todo:
         with backend.count_compilations() as count:
             start = time.perf_counter()

@@ -9,8 +9,8 @@ from pathlib import Path
 from rigid_env.extras import require
 from rigid_env.launchers.job import Ended, Job, run_job
 
-POLL_EVERY = 1.0  # between two looks at the jobs [s]
-MINUTES = 24 * 60  # that a job may take
+POLL_EVERY = 1.0  # time between two checks of the jobs [s]
+MINUTES = 24 * 60  # longest time of a job [min]
 
 
 def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None = None) -> Iterator[Ended]:

@@ -1,7 +1,7 @@
-"""Software rendering of a scene into pixels: a `Frame` says what to draw, a `Renderer` draws it.
+"""Software rendering of a scene: a `Frame` has what to draw, and a `Renderer` turns it into pixels.
 
-Knows nothing of physics or Gymnasium environments: frames are made of plain arrays. pygame is imported when
-a `Renderer` is made, not before. `rendering.picture` makes frames of a `physics.World`, `rendering.pixels` pixel
+These classes do not depend on the physics engine or on Gymnasium: frames are made of plain arrays. pygame is imported
+when a `Renderer` is made. `rendering.picture` makes frames of a `physics.World`, and `rendering.pixels` makes pixel
 observations of one.
 """
 

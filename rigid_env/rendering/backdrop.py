@@ -1,4 +1,4 @@
-"""Backdrop of a picture: background, floor and walls, shaded pixel by pixel once and then kept."""
+"""Backdrop of a picture: background, floor and walls, shaded pixel by pixel; callers keep it for later pictures."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from rigid_env.rendering.geometry import plane_axes
 from rigid_env.rendering.layout import faces_point, is_floor
 
 MINOR, MAJOR = 1.0, 5.0
-"""[m]. Spacing of the grid's thin and strong lines."""
+"""[m] Distance between the thin lines of the grid, and between its strong lines."""
 
 MINOR_STRENGTH, MAJOR_STRENGTH = 0.20, 0.52
 WALL_GRID = 1.7
-"""Grid strength on walls relative to floors, whose lighter ground shows it better."""
+"""Strength of the grid's lines on walls relative to floors; a floor is lighter, so its lines are easier to see."""
 
 LINE_WIDTH = 0.022
-"""[m]. Width of a grid line; never thinner than a pixel, but then fainter."""
+"""[m] Width of a grid line. A line that would be thinner than a pixel is drawn a pixel wide, but fainter."""
 
 WALL_OPACITY = 0.62
 CORNER_SHADE, CORNER_REACH = 0.16, 1.1
-"""Part of the light lost where walls meet, and the length [m] over which it comes back."""
+"""Share of the light lost where walls meet, and the distance [m] over which the loss decays to 1/e."""
 
 
 def draw_backdrop(camera, size, room):
-    """Background and all walls that the camera is in front of.
+    """Draw the background, and all walls whose front side faces the camera.
 
-    Every pixel's ray meets a wall at depth (offset - n·eye) / (n·ray). Of these points only the one at which
-    the ray leaves the free space is inside all other walls, so no two walls compete for a pixel.
+    The ray of each pixel meets a wall at the depth (offset - n·eye) / (n·ray). Among these points, only the one where
+    the ray leaves the free space is inside all other walls. So at most one wall is drawn at a pixel.
 
     Parameters
     ----------
@@ -35,11 +35,12 @@ def draw_backdrop(camera, size, room):
     size : (width, height)
         [px].
     room : Room
+        Part of space that is shown, with its walls.
 
     Returns
     -------
     (height, width, 3) uint8
-        sRGB.
+        Picture in sRGB.
     """
     width, height = size
     top, bottom = (np.array(c, dtype=np.float32) for c in (palette.BACKGROUND_TOP, palette.BACKGROUND_BOTTOM))
@@ -76,7 +77,7 @@ def _draw_wall(picture, rays, camera, room, index):
 
 
 def _fade(points, room):
-    """Strength of an open floor: 1 inside the room, falling smoothly to 0 at `room.fade` outside of it."""
+    """Opacity of an open floor at points (..., 3): 1 inside the room, decreasing to 0 at the distance `room.fade`."""
     outside = np.maximum(room.lower - points, 0.0) + np.maximum(points - room.upper, 0.0)
     outside[..., 1] = 0.0
     far = np.clip(np.linalg.norm(outside, axis=-1) / room.fade, 0.0, 1.0)
@@ -94,18 +95,21 @@ def _inside_bounds(points, room):
 
 
 def _pixel_footprint(values):
-    """Change of a field from one pixel to the next."""
+    """Change of a field (height, width) from one pixel to the next."""
     down, right = np.gradient(values)
     return np.abs(down) + np.abs(right) + 1e-9
 
 
 def _step(gap):
-    """Coverage of a pixel by gap ≥ 0, to first order: the anti-aliased step."""
+    """Share of each pixel in which gap ≥ 0, to first order: an anti-aliased step function of `gap` (height, width)."""
     return np.clip(0.5 + gap / _pixel_footprint(gap), 0.0, 1.0)
 
 
 def _grid(points, normal):
-    """Strength of the grid's lines on a plane, anti-aliased: a line covers width / footprint of a pixel."""
+    """Strength of the grid's lines at points of a plane, anti-aliased.
+
+    A line covers the share width / footprint of a pixel.
+    """
     strength = 0.0
     for axis in plane_axes(normal):
         coordinate = points @ axis.astype(np.float32)

@@ -1,4 +1,4 @@
-"""Convex bodies: flat-shaded faces and outlines, farthest body first."""
+"""Draw convex bodies on a canvas: flat-shaded faces with outlines, the farthest body first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigid_env.rendering import palette
 from rigid_env.rendering.solids import pose
 
 SILHOUETTE_WIDTH, EDGE_WIDTH = 1.4, 1.0
-"""[units] of the canvas."""
+"""Width of a body's outline, and of an edge between two visible faces [canvas units]."""
 
 SILHOUETTE_DARKENING, EDGE_LIGHTENING = 0.55, 0.38
 
@@ -20,7 +20,7 @@ GOAL_OUTLINE_WIDTH = 2.2
 
 
 def body_colour(body, index):
-    """sRGB colour of a `BodyView`, the `index`-th of its frame, before light falls on it."""
+    """sRGB colour of a `BodyView` before shading: its own, or that of the palette for its index in the frame."""
     return tuple(body.colour) if body.colour is not None else palette.BODIES[index % len(palette.BODIES)]
 
 
@@ -30,7 +30,10 @@ def goal_colour(goal):
 
 
 def draw_bodies(canvas, frame, room):
-    """Draw all bodies of a `Frame` on a `Canvas`; its goal may highlight a face of body 0."""
+    """Draw all bodies of a `Frame` on a `Canvas`; if the frame's goal is a face, highlight it on body 0.
+
+    `room` is not used: all stages of drawing have the same arguments.
+    """
     bodies, goal = frame.bodies, frame.goal
     if not bodies:
         return
@@ -59,7 +62,7 @@ def _draw_solid(canvas, solid, colour):
 
 
 def _draw_edges(canvas, solid, colour, dark):
-    """Dark silhouette on light edges between two visible faces, which a round body does not have."""
+    """Draw light edges between two visible faces, then the dark silhouette; a round body has only the silhouette."""
     edges, is_smooth = solid.mesh.edges, solid.mesh.is_smooth
     seen = solid.is_visible[edges[:, 2:]].sum(axis=1)
     between, outer = edges[seen == 2, :2][: 0 if is_smooth else None], edges[seen == 1, :2]
@@ -75,7 +78,7 @@ def _draw_edges(canvas, solid, colour, dark):
 
 
 def _draw_goal_face(canvas, solid, goal):
-    """An inset frame on the face; on a face turned away, its thin outline seen through the body."""
+    """Draw a white loop inside the goal face, or a thin coloured one if the face is turned away."""
     corners = solid.vertices[solid.mesh.faces[goal.goal_face]]
     centre = corners.mean(axis=0)
     inset = centre + GOAL_FACE_INSET * (corners - centre)

@@ -1,4 +1,4 @@
-"""A pinhole camera: world points to pixels and depths, and clipping to the field of view."""
+"""Pinhole camera: projects world points to pixels and depths, and clips polygons to the field of view."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 from rigid_env.rendering.geometry import clip_polygon
 
 NEAR = 0.1
-"""[m]. Nothing nearer than this is drawn; keeps the division by depth well away from zero."""
+"""[m] Smallest depth that is drawn; it keeps the division by depth away from zero."""
 
 GUARD = 1.5
-"""Polygons are clipped to this many times the picture's extent: out of sight, yet within 16-bit pixels."""
+"""Extent to which polygons are clipped, in extents of the picture: beyond its border, but within 16-bit coordinates."""
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera.
+    """Pinhole camera with a position, a direction and a field of view.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Camera:
         [m], world frame. The camera is at `eye`, sees `target` in the middle of the picture, and `up` points
         upwards in it (not along the line of sight).
     fov_y : float
-        [deg]. Vertical field of view.
+        Vertical field of view [deg].
     """
 
     eye: tuple[float, float, float]
@@ -37,7 +37,7 @@ class Camera:
 
     @cached_property
     def basis(self):
-        """(3, 3) float64. Rows: right, up and forward, unit vectors in the world frame."""
+        """Axes of the camera (3, 3) float64: rows right, up and forward, unit vectors in the world frame."""
         forward = np.subtract(self.target, self.eye)
         forward = forward / np.linalg.norm(forward)
         right = np.cross(forward, self.up)
@@ -49,7 +49,7 @@ class Camera:
         return 0.5 * height / tan(0.5 * radians(self.fov_y))
 
     def to_camera(self, points):
-        """World points in the camera's frame.
+        """Convert world points to the camera's frame.
 
         Parameters
         ----------
@@ -64,40 +64,39 @@ class Camera:
         return (np.asarray(points, dtype=np.float64) - self.eye) @ self.basis.T
 
     def project(self, points, size):
-        """Pixels and depths of world points.
+        """Project world points to pixels and depths.
 
         Parameters
         ----------
         points : (n, 3) float
             [m], world frame.
         size : (width, height)
-            [px].
+            Size of the picture [px].
 
         Returns
         -------
         pixels : (n, 2) float64
-            [px]. x to the right, y down, (0, 0) the picture's upper left corner. Of no meaning where
-            depth ≤ 0.
+            [px]. x to the right, y down, (0, 0) the picture's upper left corner. NaN where depth ≤ 0.
         depth : (n,) float64
-            [m]. Along the line of sight.
+            Distance along the line of sight [m].
         """
         local = self.to_camera(points)
         return self._to_pixels(local, size), local[:, 2]
 
     def project_polygon(self, polygon, size):
-        """Pixels of a convex polygon (or a segment), clipped to near plane and field of view.
+        """Project a convex polygon or a segment to pixels, after clipping it to the near plane and the field of view.
 
         Parameters
         ----------
         polygon : (n, 3) float
-            [m], world frame, vertices in order; n = 2 is a segment.
+            Vertices in order, world frame [m]; n = 2 is a segment.
         size : (width, height)
-            [px].
+            Size of the picture [px].
 
         Returns
         -------
         (k, 2) float64
-            [px]. k = 0 if none of it is in sight.
+            [px]. k = 0 if no part is in view.
         """
         local = clip_polygon(self.to_camera(polygon), (0.0, 0.0, 1.0), NEAR)
         width, height = size
@@ -110,17 +109,17 @@ class Camera:
         return self._to_pixels(local, size)
 
     def rays(self, size):
-        """Direction of the ray through the middle of every pixel, with depth 1.
+        """Rays through the middles of all pixels, with depth 1.
 
         Parameters
         ----------
         size : (width, height)
-            [px].
+            Size of the picture [px].
 
         Returns
         -------
         (height, width, 3) float32
-            World frame: eye + depth · ray is what the pixel sees.
+            World frame: the pixel sees the points eye + depth · ray.
         """
         width, height = size
         focal = self.focal(height)
@@ -138,26 +137,27 @@ class Camera:
 
 
 def fit_camera(points, direction, size, fov_y=30.0, margin=0.06, up=(0.0, 1.0, 0.0)):
-    """Nearest camera that looks along a direction and has all points in sight.
+    """Nearest camera that looks in a direction and has all points in view.
 
     A point has the coordinates x across the picture and s along the line of sight. The eye is at x = c, a distance d
-    back. The point is in sight if |x - c| ≤ t (s + d), with t the tangent of half the field of view. All points are if
-    max(x - t s) - t d ≤ c ≤ min(x + t s) + t d. So d is at least (max(x - t s) - min(x + t s)) / (2t), and with this d
-    one c is left, in the middle. Upwards the same holds; the larger d is taken.
+    back. The point is in view if |x - c| ≤ t (s + d), with t the tangent of half the field of view. All points are in
+    view if max(x - t s) - t d ≤ c ≤ min(x + t s) + t d. So d is at least (max(x - t s) - min(x + t s)) / (2t). For this
+    d, only one c is possible: the middle. The same holds for the vertical coordinate; the larger d is taken.
 
     Parameters
     ----------
     points : (n, 3) float
         [m], world frame.
     direction : (3,) float
-        Where the camera looks to, world frame.
+        Line of sight, world frame.
     size : (width, height)
-        [px].
+        Size of the picture [px].
     fov_y : float
-        [deg]. Vertical field of view.
+        Vertical field of view [deg].
     margin : float
-        Part of the picture left free on each side.
+        Share of the picture that stays empty on each side.
     up : (3,) float
+        Upward direction of the picture, world frame.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Check cameras and switches given as arguments, before anything is drawn."""
+"""Check cameras and switches that are given as arguments, before anything is drawn."""
 
 from __future__ import annotations
 
@@ -13,15 +13,14 @@ import numpy as np
 from rigid_env.rendering.camera import Camera
 
 CameraArgument = Camera | Mapping[str, Any] | None
-"""Type of the argument: a camera, a mapping of its parameters such as ``{"eye": (0, 8, 20)}``, or None for the default.
-"""
+"""Type of an argument: a camera, a mapping of its parameters such as ``{"eye": (0, 8, 20)}``, or None."""
 
 ALONG = 1e-6
-"""Least sine of the angle between `up` and the line of sight; below it they count as one direction."""
+"""Smallest sine of the angle between `up` and the line of sight; below it they count as parallel."""
 
 
 def as_camera(value: CameraArgument, field: str = "camera") -> Camera | None:
-    """Camera of an argument, with its parameters checked; None for None.
+    """Make a `Camera` of an argument, and check its parameters; None stays None.
 
     Parameters
     ----------
@@ -55,13 +54,13 @@ def as_camera(value: CameraArgument, field: str = "camera") -> Camera | None:
 
 
 def upwards(eye: Sequence[float], target: Sequence[float]) -> tuple[float, float, float]:
-    """Upward direction of a picture: y, or -z where the camera looks along y."""
+    """Upward direction of a picture, for a camera at `eye` that looks at `target`: y, or -z for a view along y."""
     x, _, z = np.subtract(target, eye)
     return (0.0, 0.0, -1.0) if np.hypot(x, z) <= ALONG * np.linalg.norm(np.subtract(target, eye)) else (0.0, 1.0, 0.0)
 
 
 def as_switch(value: bool, field: str) -> bool:
-    """Return a switch as True or False.
+    """Check that an argument is True or False, and return it as bool; `field` is its name in the error.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A surface twice the picture's size, a camera, and shapes given in world coordinates."""
+"""Canvas: a surface larger than the picture, on which shapes in world coordinates are drawn through a camera."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from rigid_env.rendering.camera import NEAR
 from rigid_env.rendering.geometry import point_lists
 
 SUPERSAMPLING = 2
-"""Pixels of the canvas for one of the picture, along each side."""
+"""Pixels of the canvas per pixel of the picture, along each side."""
 
 REFERENCE_HEIGHT = 600
-"""[px]. Widths of lines and marks are given in units: pixels of a picture this high, else in proportion."""
+"""[px] Height of a picture in which a canvas unit, the unit of line widths and marks, is one pixel; it scales with
+height."""
 
 LEAST_UNIT = 0.55
-"""[px] of the picture. Below it lines would vanish in small pictures."""
+"""[px] Smallest canvas unit in pixels of the picture; below it lines would vanish in small pictures."""
 
 
 class Canvas:
-    """Draws world-frame shapes on a pygame surface.
+    """Surface of pygame on which shapes in the world frame are drawn.
 
     Parameters
     ----------
@@ -40,19 +41,22 @@ class Canvas:
         self._filled = pygame.gfxdraw.filled_polygon
 
     def project(self, points):
-        """Canvas pixels (n, 2) and depths (n,) [m] of world points (n, 3) [m]."""
+        """Project world points (n, 3) [m] to canvas pixels (n, 2) and depths (n,) [m]."""
         return self.camera.project(points, self.size)
 
     def polygon(self, points, colour, alpha=255):
-        """Fill a convex world polygon (n, 3) [m], clipped to the field of view; alpha 0..255."""
+        """Fill a convex polygon (n, 3) in world coordinates [m], clipped to the field of view.
+
+        `alpha` is its opacity, 0 to 255.
+        """
         self.fill(self.camera.project_polygon(points, self.size), colour, alpha)
 
     def loop(self, points, width, colour):
-        """Closed line of `width` units through world points (n, 3) [m]."""
+        """Draw a closed line, `width` units wide, through world points (n, 3) [m]."""
         self.segments(points, np.roll(points, -1, axis=0), width, colour)
 
     def segments(self, starts, ends, width, colour):
-        """Lines of `width` units between world points (n, 3) and (n, 3) [m], clipped."""
+        """Draw lines, `width` units wide, between world points (n, 3) and (n, 3) [m], clipped to the field of view."""
         pixels, depths = self.project(np.concatenate([starts, ends]))
         if self.is_in_sight(pixels, depths):
             self.strokes(pixels[: len(starts)], pixels[len(starts) :], width, colour)
@@ -63,22 +67,22 @@ class Canvas:
                 self.strokes(pair[:1], pair[1:], width, colour)
 
     def is_in_sight(self, pixels, depths):
-        """True if projected points can be drawn as they are: in front of the camera and not far off."""
+        """True if projected points need no clipping: all are in front of the camera and not far outside the picture."""
         return bool(self.are_in_sight(pixels[None], depths[None])[0])
 
     def are_in_sight(self, pixels, depths):
-        """(n,) bool: `is_in_sight` of n groups of points, pixels (n, k, 2) and depths (n, k)."""
+        """Result (n,) bool of `is_in_sight` for n groups of points, with pixels (n, k, 2) and depths (n, k)."""
         size = np.array(self.size)
-        # a comparison with the place of a point behind the camera, which is not a number, is False
+        # pixels of points behind the camera are NaN, and comparisons with NaN are False
         is_near = (pixels < 1.5 * size) & (pixels > -0.5 * size)
         return is_near.all(axis=(1, 2)) & (depths > NEAR).all(axis=1)
 
     def stored(self, colours):
-        """sRGB colours (n, 3) int as the surface stores them, (n,) int64, which is the fastest form to draw with."""
+        """sRGB colours (n, 3) int as integers (n,) int64 in the surface's own format, the fastest form to draw with."""
         return colours @ self._weights
 
     def fill(self, pixels, colour, alpha=255):
-        """Fill a convex polygon given in canvas pixels (n, 2)."""
+        """Fill a convex polygon given in canvas pixels (n, 2); `alpha` is its opacity, 0 to 255."""
         if len(pixels) < 3:
             return
         if alpha == 255:
@@ -87,19 +91,23 @@ class Canvas:
             self._filled(self.surface, np.rint(pixels).astype(int).tolist(), (*colour, alpha))
 
     def fill_faces(self, pixels, corner_getters, colours):
-        """Fill convex polygons: each takes its corners out of all vertices in canvas pixels (n, 2)."""
+        """Fill convex polygons with one colour each.
+
+        `pixels` (n, 2) are all vertices [canvas pixels]; each of `corner_getters` picks the corners of a polygon from
+        them.
+        """
         draw, surface, points = self._draw.polygon, self.surface, list(zip(*pixels.T.tolist()))
         for corners, colour in zip(corner_getters, colours):
             draw(surface, colour, corners(points))
 
     def stroke(self, pixels, width, colour):
-        """Line with round joints through canvas pixels (n, 2); `width` in units."""
+        """Draw a line with round joints, `width` units wide, through canvas pixels (n, 2)."""
         self.strokes(pixels[:-1], pixels[1:], width, colour)
 
     def strokes(self, starts, ends, widths, colours):
-        """Lines between canvas pixels (n, 2) and (n, 2), with round ends, one after the other.
+        """Draw n lines with round ends between canvas pixels (n, 2) and (n, 2), one after the other.
 
-        `widths` in units and `colours` are one for all, or of each its own: (n,) float and a list of n.
+        `widths` [canvas units] and `colours` hold for all lines, or have one for each: (n,) float and a list of n.
         """
         half = np.broadcast_to(0.5 * self.unit * np.asarray(widths), len(starts))
         colours = colours if isinstance(colours, list) else [colours] * len(starts)
@@ -116,5 +124,5 @@ class Canvas:
                     draw.circle(surface, colour, joint, radius)
 
     def disc(self, pixel, radius, colour):
-        """Disc of `radius` units around a canvas pixel (2,)."""
+        """Draw a disc with a radius in canvas units around a canvas pixel (2,)."""
         self._draw.circle(self.surface, colour, pixel.tolist(), self.unit * radius)

@@ -1,4 +1,7 @@
-"""Frame to draw: the interface between simulation and renderer. Plain arrays, world frame, SI units."""
+"""Frame: everything that one picture shows, as plain arrays in the world frame and SI units.
+
+It is the interface between simulation and renderer.
+"""
 
 from __future__ import annotations
 
@@ -21,24 +24,25 @@ NO_POINTS.setflags(write=False)
 
 @dataclass(frozen=True, eq=False)
 class BodyView:
-    """Pose, shape and loads of one rigid body.
+    """Shape, pose and colour of one rigid body in a picture.
 
     Parameters
     ----------
     kind : {"block", "sphere", "ellipsoid", "hull"}
+        Kind of shape.
     dimensions : (3,) float
-        [m]. Full edge lengths of a block; semi-axes of a sphere (all equal) or ellipsoid; how far a hull reaches from
-        `pos`. Body frame.
+        [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A hull: largest distances of its
+        corners from `pos`.
     pos : (3,) float
-        [m]. Geometric centre, of a hull its centre of mass, world frame.
+        Geometric centre of the shape; of a hull its centre of mass. World frame [m].
     quat : (4,) float
         Unit quaternion w, x, y, z, body to world.
     colour : (3,) int or None
         sRGB, 0..255; None takes the next colour of the palette.
     corners : (n, 3) float
-        [m]. Of a hull, from `pos`, body frame; none of the others.
+        Corners of a hull from `pos`, body frame [m]; other shapes have none.
     faces : tuple of tuples of int
-        Of a hull: the corners of each face, counter-clockwise as seen from outside.
+        Indices of the corners of each face of a hull, counter-clockwise as seen from outside.
 
     Raises
     ------
@@ -69,18 +73,18 @@ class BodyView:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """All bodies of a frame in one array each.
+    """Poses and sizes of all bodies of a frame, in one array each.
 
     Parameters
     ----------
     pos : (n, 3) float64
-        [m]. World frame.
+        `BodyView.pos` [m].
     rotation : (n, 3, 3) float64
-        Columns are the body's axes in the world frame.
+        Rotation matrices: columns are the body's axes in the world frame.
     size : (n, 3) float64
-        [m]. `BodyView.dimensions`.
+        `BodyView.dimensions` [m].
     radius : (n,) float64
-        [m]. Of a sphere round `pos` that holds the body.
+        Radius of a sphere about `pos` that holds the body [m].
     """
 
     pos: np.ndarray
@@ -91,12 +95,12 @@ class Poses:
 
 @dataclass(frozen=True, eq=False)
 class WallView:
-    """One wall: bodies may be where normal·x ≥ offset.
+    """One wall in a picture: bodies may be where normal·x ≥ offset.
 
     Parameters
     ----------
     normal : (3,) float
-        Unit vector out of the wall, world frame; normalised here (the offset with it).
+        Normal that points out of the wall, world frame; normal and offset are divided by its length.
     offset : float
         [m].
 
@@ -120,16 +124,16 @@ class WallView:
 
 @dataclass(frozen=True, eq=False)
 class GoalView:
-    """Goal of the agent: a place on the floor, a face of body 0 to be turned, or both.
+    """Goal of the agent in a picture: a place on the floor, a face of body 0 to be turned, or both.
 
     Parameters
     ----------
     pos : (3,) float or None
-        [m]. Target of the body's centre, world frame; its foot on the floor carries the disc. None: no disc.
+        Target of the body's centre, world frame [m]; a disc is drawn on the floor below it. None: no disc.
     radius : float
-        [m]. Of the disc.
+        Radius of the disc [m].
     reached : bool
-        Chooses the colour.
+        Whether the goal is reached; it chooses the colour.
     goal_face : int or None
         Face of body 0 (a block) to highlight: 0..5 = -x, +x, -y, +y, -z, +z of the body's axes.
 
@@ -161,19 +165,19 @@ class Frame:
     walls : tuple of WallView
     goal : GoalView or None
     contact_points : (n, 3) float
-        [m]. World frame.
+        World frame [m].
     contact_forces : (n, 3) float
-        [N]. On the body, world frame, one for each contact point.
+        Force on the body at each contact point, world frame [N].
     applied_force : (3,) or (n, 3) float
-        [N]. At the centre of body 0, or of the first n bodies, world frame; kept as (n, 3).
+        Force at the centre of body 0, or of the first n bodies, world frame [N]; kept as (n, 3).
     applied_torque : (3,) or (n, 3) float
-        [N m]. On the same bodies, world frame; kept as (n, 3).
+        Torque on the same bodies, world frame [N m]; kept as (n, 3).
     path : (n, 3) float
-        [m]. Line along which a body has come, world frame; it is drawn again on the floor below.
+        Earlier positions of a body, world frame [m]; they are drawn as a line, and again on the floor below.
     text : tuple of str
-        Lines in the upper left corner.
+        Lines of text in the upper left corner.
     force_scale : float
-        [m/N]. Length of a force's arrow; a torque's arc is |torque| · force_scale / (1 m) long.
+        Length of an arrow per unit of force [m/N]; the arc of a torque is |torque| · force_scale / (1 m) long.
 
     Raises
     ------
@@ -207,19 +211,19 @@ class Frame:
 
     @property
     def has_arrows(self):
-        """True if there is a contact, or a force or torque is applied."""
+        """True if the frame has a contact point, or an applied force or torque."""
         return len(self.contact_points) > 0 or bool(np.any(self.applied_force)) or bool(np.any(self.applied_torque))
 
     @cached_property
     def poses(self):
-        """`Poses` of the bodies."""
+        """Poses and sizes of the bodies as `Poses`."""
         count = len(self.bodies)
         pos, size = (
             np.array([getattr(b, name) for b in self.bodies]).reshape(count, 3) for name in ("pos", "dimensions")
         )
         rotation = rotation_matrices(np.array([body.quat for body in self.bodies]).reshape(count, 4))
         is_block = np.array([body.kind == "block" for body in self.bodies], dtype=bool)
-        # the corner of a block, the longest semi-axis, and of a hull the corner of the box that it reaches to
+        # half the diagonal of a block, the longest semi-axis of a round body, the corner of a box around a hull
         is_round = np.array([body.kind in ("sphere", "ellipsoid") for body in self.bodies], dtype=bool)
         radius = np.where(
             is_round, size.max(axis=1), np.where(is_block, 0.5, 1.0) * np.sqrt(np.sum(size * size, axis=1))
@@ -228,10 +232,10 @@ class Frame:
 
 
 def _set_array(view, name, shape):
-    """Replace the attribute by its read-only float64 copy; -1 in `shape` stands for any length."""
+    """Replace an attribute of a view by a read-only float64 copy, and check its shape; -1 means any length."""
     given = getattr(view, name)
     if _is_kept(given):
-        array = given  # of another view, as `dataclasses.replace` hands it on
+        array = given  # no copy: the array of another view, passed on by `dataclasses.replace`
     else:
         array = np.array(given, dtype=np.float64)
         array.setflags(write=False)
@@ -245,5 +249,5 @@ def _set_array(view, name, shape):
 
 
 def _is_kept(array):
-    """True if an array cannot change any more: it is read-only, and no view of another."""
+    """True if an array can no longer change: it is read-only, and not a view of another array."""
     return type(array) is np.ndarray and array.dtype == np.float64 and not array.flags.writeable and array.base is None

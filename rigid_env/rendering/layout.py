@@ -1,4 +1,4 @@
-"""Choose the visible part of the endless walls, and the viewpoint: a room around the scene and its camera."""
+"""Choose the part of space that a picture shows, a room between the endless walls, and a camera for it."""
 
 from __future__ import annotations
 
@@ -11,46 +11,46 @@ from rigid_env.rendering.camera import fit_camera
 from rigid_env.rendering.geometry import clip_polygon, plane_axes
 
 AXIS_ALIGNED = 0.99
-"""A wall bounds the room along an axis if its normal's component is at least this."""
+"""Smallest component of a wall's normal along an axis for which the wall bounds the room along this axis."""
 
 FLOOR_SLOPE = 0.7
-"""A wall is a floor if its normal's upward component exceeds this (steeper than 45 degrees it is a wall)."""
+"""Smallest upward component of the normal of a floor; a plane steeper than about 45 degrees is a wall instead."""
 
 ROOM_HEIGHT = 1.6
-"""Height of a room open to the top, in units of the largest body extent."""
+"""Height of a room that is open at the top, in extents of the largest body."""
 
 OPEN_DEPTH = 0.95
-"""Half the room's extent along an axis without walls, in the same unit."""
+"""Half the size of the room along an axis without walls, in extents of the largest body."""
 
 OPEN_LENGTH = 2.0
-"""The room's extent along a horizontal axis with one wall, in the same unit."""
+"""Size of the room along a horizontal axis with one wall, in extents of the largest body."""
 
 FADE_LENGTH = 1.8
-"""Length over which an open floor fades out beyond the room, in the same unit."""
+"""Distance over which an open floor fades out beyond the room, in extents of the largest body."""
 
 FRONT_VIEW = (-0.13, -0.36, -1.0)
 """Line of sight into a room without a back wall: from the front, 20 degrees down, 7 from the right."""
 
 MARGIN = 0.02
-"""Part of the picture left free on each side of the room."""
+"""Share of the picture that stays empty on each side of the room."""
 
 FIELD_OF_VIEW = 24.0
-"""[deg]. Narrow enough for edges to look parallel, wide enough for the walls to be seen from inside."""
+"""[deg] Vertical field of view: narrow enough for edges to look parallel, wide enough to see walls from inside."""
 
 CORNER_DOWN = 0.62
-"""Downward slope of the line of sight into a corner (32 degrees)."""
+"""Downward component of the line of sight into a corner, relative to the horizontal one (32 degrees)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Room:
-    """The part of space that is shown.
+    """Part of space that a picture shows.
 
     Parameters
     ----------
     lower, upper : (3,) float64
-        [m]. Axis-aligned bounds, world frame.
+        Axis-aligned bounds, world frame [m].
     fade : float
-        [m]. Length over which the floor fades out beyond open sides.
+        Distance over which the floor fades out beyond open sides [m].
     walls : tuple of WallView
     """
 
@@ -60,26 +60,27 @@ class Room:
     walls: tuple
 
     def corners(self):
-        """(8, 3) float64 [m]. Corners of the bounds, world frame."""
+        """Corners (8, 3) float64 of the bounds, world frame [m]."""
         return np.array(np.meshgrid(*zip(self.lower, self.upper))).reshape(3, -1).T
 
     @cached_property
     def wall_polygons(self):
-        """Tuple of (k, 3) float64 [m]: `wall_polygon` of every wall."""
+        """Polygon of every wall from `wall_polygon`: a tuple of (k, 3) float64 [m]."""
         return tuple(self.wall_polygon(index) for index in range(len(self.walls)))
 
     def wall_polygon(self, index):
-        """Part of a wall inside the room and all other walls.
+        """Visible part of a wall: a polygon inside the room and on the free side of all other walls.
 
         Parameters
         ----------
         index : int
-            Of the wall.
+            Index of the wall.
 
         Returns
         -------
         (k, 3) float64
-            [m]. World frame, in order; a floor reaches out until it has faded. k = 0 if nothing is left.
+            Vertices in order, world frame [m]; a floor extends beyond the room until it has faded. k = 0 if nothing is
+            left.
         """
         wall = self.walls[index]
         reach = self.fade if is_floor(wall) else 0.0
@@ -99,7 +100,7 @@ class Room:
 
 
 def is_floor(wall):
-    """True if a `WallView` looks upwards."""
+    """True if the normal of a `WallView` points upwards, as that of a floor."""
     return wall.normal[1] > FLOOR_SLOPE
 
 
@@ -109,15 +110,15 @@ def faces_point(wall, point):
 
 
 def make_room(walls, bodies, bounds=None):
-    """Room between the walls; where there are none, large enough for the bodies.
+    """Make the room between the walls; along axes without walls it is large enough for the bodies.
 
     Parameters
     ----------
     walls : tuple of WallView
     bodies : tuple of BodyView
-        Without walls the room is centred on the mean of their positions, otherwise only their sizes count.
+        The largest size scales the room. Without any walls, the room is centred on the mean of the bodies' positions.
     bounds : pair of (3,) float, optional
-        [m]. Lower and upper corner of a box that the open sides of the room reach.
+        Lower and upper corner of a box that the room includes on its open sides [m].
 
     Returns
     -------
@@ -150,13 +151,13 @@ def make_room(walls, bodies, bounds=None):
 
 
 def default_camera(room, size):
-    """Camera that has the whole room in sight: into the corner if there is one, otherwise from the front.
+    """Camera that has the whole room in view: it looks into the corner if there is one, otherwise from the front.
 
     Parameters
     ----------
     room : Room
     size : (width, height)
-        [px].
+        Size of the picture [px].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Convex meshes in the body frame: block, sphere, ellipsoid, hull."""
+"""Convex meshes of bodies in the body frame: block, sphere, ellipsoid, hull."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from operator import itemgetter
 import numpy as np
 
 SPHERE_SUBDIVISIONS = 12
-"""Subdivisions of an octahedron's face, which becomes their square in triangles (8 · 144 in all): round to the eye."""
+"""Subdivisions n of each edge of an octahedron's face, which becomes n² triangles; with 12 a sphere looks round."""
 
 BLOCK_FACES = np.array(
     [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
@@ -20,20 +20,20 @@ BLOCK_FACES = np.array(
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A closed convex polyhedron.
+    """Closed convex polyhedron.
 
     Parameters
     ----------
     vertices : (n, 3) float64
         [m], body frame.
     faces : (m, k) int
-        Vertex indices, counter-clockwise as seen from outside.
+        Vertex indices of each face, counter-clockwise as seen from outside.
     normals : (m, 3) float64
         Outward unit normals, body frame.
     edges : (e, 4) int
-        Columns: the two vertices, the two faces.
+        For each edge the indices of its two vertices, and of its two faces.
     is_smooth : bool
-        Stands for a round body: only its silhouette is outlined.
+        True if it approximates a round body, of which only the silhouette is outlined.
     """
 
     vertices: np.ndarray
@@ -44,22 +44,22 @@ class Mesh:
 
     @cached_property
     def centres(self):
-        """(m, 3) float64 [m]. Means of the faces' vertices, body frame."""
+        """Means (m, 3) float64 of the faces' vertices, body frame [m]."""
         return self.vertices[self.faces].mean(axis=1)
 
     @cached_property
     def corner_getters(self):
-        """Functions that take the corners of each face out of a list of the vertices."""
+        """Functions, one for each face, that pick the corners of the face from a list of all vertices."""
         return [itemgetter(*face) for face in self.faces.tolist()]
 
     @cached_property
     def is_odd_octant(self):
-        """Faces (m,) bool in every second octant of the body frame."""
+        """Flags (m,) bool of the faces in every second octant of the body frame."""
         return np.prod(self.centres, axis=1) < 0.0
 
 
 def body_mesh(body):
-    """Mesh of a `BodyView`, made once for each shape.
+    """Mesh of a `BodyView`, which is kept for other bodies of the same shape.
 
     Returns
     -------
@@ -77,7 +77,7 @@ def _body_mesh(kind, dimensions):
 
 @lru_cache(maxsize=16)
 def unit_mesh(kind, subdivisions=SPHERE_SUBDIVISIONS):
-    """Block with edges 1, or (`kind` is another) `patched_sphere`: a `Mesh` to be stretched by a body's dimensions.
+    """Mesh of unit size, to be stretched by a body's dimensions: a block with edges 1 ("block"), else `patched_sphere`.
 
     Returns
     -------
@@ -88,14 +88,14 @@ def unit_mesh(kind, subdivisions=SPHERE_SUBDIVISIONS):
 
 
 def block_mesh(size):
-    """Block with edges `size` (3,) [m] along the body axes; faces in the order -x, +x, -y, +y, -z, +z."""
+    """Mesh of a block with edges `size` (3,) [m] along the body axes; faces in the order -x, +x, -y, +y, -z, +z."""
     signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=np.float64)
     return _mesh(0.5 * signs * np.asarray(size, dtype=np.float64), BLOCK_FACES, is_smooth=False)
 
 
 @lru_cache(maxsize=256)
 def hull_mesh(corners, polygons):
-    """Convex polyhedron of `corners` (n tuples of 3) [m] with `polygons`, tuples of corners; see `BodyView`.
+    """Mesh of a convex polyhedron with `corners`, n tuples (x, y, z) [m], and `polygons`, tuples of corner indices.
 
     Each polygon is cut into a fan of triangles; sides between two triangles of a polygon are no edges.
     """
@@ -111,7 +111,7 @@ def hull_mesh(corners, polygons):
 
 
 def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
-    """Ellipsoid with `semi_axes` (3,) [m] along the body axes: a subdivided octahedron blown up to a sphere.
+    """Mesh of an ellipsoid with `semi_axes` (3,) [m] along the body axes: a subdivided octahedron, projected onto it.
 
     Every triangle lies in one octant, so that octants can be told apart by colour.
     """
@@ -121,10 +121,10 @@ def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
 
 
 def patched_sphere(subdivisions):
-    """Sphere of radius 1 with the triangles of `ellipsoid_mesh` in pairs as quadrangles: half as many faces to draw.
+    """Mesh of a sphere of radius 1, with the triangles of `ellipsoid_mesh` joined in pairs to quadrangles.
 
-    Their corners are nearly in a plane; the normal is that of the two diagonals. A triangle that is left alone has its
-    last corner twice.
+    It has half as many faces to draw. The corners of a quadrangle are nearly in a plane; its normal is perpendicular to
+    both diagonals. A triangle without a partner has its last corner twice.
 
     Returns
     -------
@@ -139,7 +139,11 @@ def patched_sphere(subdivisions):
 
 
 def _subdivided_octahedron(n, cells):
-    """Integer vertices with |x| + |y| + |z| = n, and the faces between them: `_triangles` or `_squares`."""
+    """Vertices and faces of an octahedron whose faces are subdivided n times.
+
+    Returns integer vertices with |x| + |y| + |z| = n, and faces as vertex indices. `cells` makes the cells of one
+    octant: `_triangles` or `_squares`.
+    """
     index, faces = {}, []
 
     def vertex(p):
@@ -156,7 +160,7 @@ def _subdivided_octahedron(n, cells):
 
 
 def _triangles(n):
-    """Triangles of the grid i + j ≤ n, i, j ≥ 0, counter-clockwise in the (i, j) plane."""
+    """Yield the triangles of the grid i + j ≤ n, i, j ≥ 0, counter-clockwise in the (i, j) plane."""
     for i in range(n):
         for j in range(n - i):
             yield (i, j), (i + 1, j), (i, j + 1)
@@ -165,7 +169,7 @@ def _triangles(n):
 
 
 def _squares(n):
-    """Squares of the same grid; along i + j = n are triangles, with the last corner twice."""
+    """Yield the squares of the grid i + j ≤ n, i, j ≥ 0; along i + j = n, triangles with the last corner twice."""
     for i in range(n):
         for j in range(n - i):
             far = (i + 1, j + 1) if i + j + 2 <= n else (i, j + 1)

@@ -1,4 +1,4 @@
-"""Overlays that explain the picture: the goal's disc, contact points, arrows of forces and torques, near walls."""
+"""Overlays that explain a picture: the goal's disc, contact points, arrows of forces and torques, walls in front."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from rigid_env.rendering.layout import faces_point, is_floor
 from rigid_env.rendering.meshes import body_mesh
 
 ARROW_WIDTH, HEAD_LENGTH, HEAD_WIDTH, HALO_WIDTH = 3.0, 13.0, 11.0, 1.3
-"""[units] of the canvas."""
+"""Width of an arrow's line, length and width of its head, and width of its white border [canvas units]."""
 
 ARROW_LIMIT = 8.0
-"""[m]. Longest arrow drawn: the force of an impact would reach out of every picture."""
+"""[m] Length of the longest arrow that is drawn; the force of an impact is cut to it."""
 
 CONTACT_RADIUS = 4.2
-"""[units] of the canvas."""
+"""Radius of the disc at a contact point [canvas units]."""
 
 TORQUE_RADIUS = 0.42
-"""Radius of a torque's arc, in units of the body's largest extent."""
+"""Radius of the arc that shows a torque, in extents of the body."""
 
 TORQUE_SWEEP = np.radians(300.0)
-"""[rad]. Largest angle of a torque's arc."""
+"""Largest angle of the arc that shows a torque [rad]."""
 
 AXIS_WIDTH = 1.8
-"""[units] of the canvas. Width of the line along a torque's axis."""
+"""Width of the line along a torque's axis [canvas units]."""
 
 PATH_WIDTH = 2.2
-"""[units] of the canvas."""
+"""Width of the line along a body's path [canvas units]."""
 
 TORQUE_STEP = np.radians(6.0)
 DISC_CORNERS = 72
@@ -39,7 +39,10 @@ NEAR_WALL_ALPHA = 12
 
 
 def draw_goal(canvas, goal, room):
-    """Disc, ring and centre mark on the floor of a `Room`, at the foot of the target of a `GoalView` or None."""
+    """Draw a disc with ring and centre mark on the floor of a `Room`, below the target of a `GoalView`.
+
+    Nothing is drawn if the goal is None or has no target.
+    """
     if goal is None or goal.pos is None:
         return
     floors = [w for w in room.walls if is_floor(w)]
@@ -58,7 +61,7 @@ def draw_goal(canvas, goal, room):
 
 
 def draw_path(canvas, frame, room):
-    """Draw the path of a body, and its projection onto the floors of a `Room` below it."""
+    """Draw the path of a `Frame` as a line, and its projection onto the floors of a `Room`."""
     if len(frame.path) < 2:
         return
     for wall in room.walls:
@@ -69,7 +72,7 @@ def draw_path(canvas, frame, room):
 
 
 def draw_contacts(canvas, frame, room):
-    """Discs at the contact points and red arrows of their forces; paler where the body hides them."""
+    """Draw discs at the contact points and red arrows of their forces; they are paler where a body hides them."""
     if len(frame.contact_points) == 0:
         return
     is_hidden = hidden_points(frame.contact_points, frame.bodies, canvas.camera.eye)
@@ -86,7 +89,7 @@ def draw_contacts(canvas, frame, room):
 
 
 def draw_wrench(canvas, frame, room):
-    """Orange arrows of applied forces and purple arcs of applied torques, at the centres of their bodies."""
+    """Draw orange arrows of applied forces and purple arcs of applied torques, at the centres of the bodies."""
     for body, torque in zip(frame.bodies, frame.applied_torque):
         _draw_torque(canvas, body, frame.force_scale * torque)
     for body, force in zip(frame.bodies, frame.applied_force):
@@ -94,14 +97,16 @@ def draw_wrench(canvas, frame, room):
 
 
 def draw_arrow(canvas, start, vector, colour):
-    """Draw an arrow over all that is already drawn.
+    """Draw an arrow on top of everything that is already drawn.
 
     Parameters
     ----------
     canvas : Canvas
     start, vector : (3,) float
-        [m], world frame. Cut off at `ARROW_LIMIT`; nothing is drawn of one shorter than a pixel.
+        Start and direction with length, world frame [m]. A longer vector is cut to `ARROW_LIMIT`; an arrow shorter than
+        a pixel is left out.
     colour : (3,) int
+        sRGB.
     """
     length = np.linalg.norm(vector)
     if not 0.0 < length < np.inf:
@@ -113,12 +118,12 @@ def draw_arrow(canvas, start, vector, colour):
 
 
 def has_near_walls(camera, room):
-    """True if a wall of a `Room` is between its inside and a `Camera`."""
+    """True if a wall of a `Room` is between the camera and the inside of the room."""
     return any(len(p) >= 3 and not faces_point(w, camera.eye) for w, p in zip(room.walls, room.wall_polygons))
 
 
 def draw_near_walls(canvas, room):
-    """Draw walls between camera and scene as an outline and a faint tint, in front of everything."""
+    """Draw walls between the camera and the scene in front of everything, as an outline and a faint tint."""
     for index, wall in enumerate(room.walls):
         polygon = room.wall_polygons[index]
         if len(polygon) >= 3 and not faces_point(wall, canvas.camera.eye):
@@ -127,7 +132,7 @@ def draw_near_walls(canvas, room):
 
 
 def draw_far_outlines(canvas, room):
-    """Outlines of the walls behind the scene; floors fade out instead."""
+    """Draw the outlines of the walls behind the scene, except floors, which fade out."""
     for index, wall in enumerate(room.walls):
         polygon = room.wall_polygons[index]
         if len(polygon) >= 3 and faces_point(wall, canvas.camera.eye) and not is_floor(wall):
@@ -135,10 +140,10 @@ def draw_far_outlines(canvas, room):
 
 
 def hidden_points(points, bodies, eye):
-    """True if a body is between points and eye.
+    """Find points that a body hides from the eye.
 
-    A point eye + s (point - eye) is inside a convex polyhedron if n·x ≤ n·vertex for all its faces; each face
-    bounds s on one side. The point is hidden if the bounds leave room before s = 1.
+    A point eye + s (point - eye) is inside a convex polyhedron if n·x ≤ n·vertex for all its faces; each face gives a
+    lower or upper bound of s. The point is hidden if some s < 1 satisfies all bounds.
 
     Parameters
     ----------
@@ -171,7 +176,7 @@ def hidden_points(points, bodies, eye):
 
 
 def _draw_torque(canvas, body, scaled):
-    """Arc around the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
+    """Draw an arc with an arrow head around the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
     size = np.linalg.norm(scaled)
     if not 0.0 < size < np.inf:
         return
@@ -191,7 +196,7 @@ def _draw_torque(canvas, body, scaled):
 
 
 def _axes_towards(canvas, centre, normal):
-    """Axes of the plane of `normal`, the first as close as possible to the camera's direction."""
+    """Two unit axes that span the plane of `normal`; the first is as near as possible to the camera's direction."""
     sight = np.asarray(canvas.camera.eye) - centre
     u = sight - (sight @ normal) * normal
     if np.linalg.norm(u) < 1e-3 * np.linalg.norm(sight):
@@ -206,7 +211,7 @@ def _circle(centre, axes, radius, angles):
 
 
 def _arrow_line(canvas, pixels, colour):
-    """Line through canvas pixels (n, 2) with a head at its end, on a white halo."""
+    """Draw a line through canvas pixels (n, 2) with an arrow head at its end, on a white border."""
     lengths = np.hypot(*np.diff(pixels, axis=0).T)
     total = lengths.sum()
     if total < canvas.unit:
@@ -227,7 +232,10 @@ def _arrow_line(canvas, pixels, colour):
 
 
 def _cut_back(pixels, lengths, cut):
-    """Line without its last `cut` pixels, and its new end."""
+    """Shorten a line through pixels (n, 2) by `cut` pixels at its end; returns the line and its new end.
+
+    `lengths` (n - 1,) are the lengths of its segments [px].
+    """
     keep = len(lengths)
     while keep > 1 and lengths[keep - 1] <= cut:
         cut -= lengths[keep - 1]

@@ -1,4 +1,4 @@
-"""Draw frames onto a picture in memory: the stages of drawing in order, and a cache of unchanging parts."""
+"""Painter of frames into a picture in memory: calls the stages of drawing in order, and caches unmoving parts."""
 
 from __future__ import annotations
 
@@ -27,32 +27,33 @@ from rigid_env.rendering.shadow_layer import LitWall, ShadowLayer, lit_walls
 
 BODY_STAGES = (draw_path, draw_bodies)
 ARROW_STAGES = (draw_contacts, draw_wrench)
-"""Stages that draw arrows, in order; each is a function of canvas, frame and room."""
+"""Stages of drawing that draw arrows, in order; each is a function of canvas, frame and room."""
 
 LINE_REACH = 3.0
-"""[px] at 600 px of height, and in smaller pictures. Largest distance of a body's line from the body."""
+"""[px] Largest distance of a body's outline from the body, in pictures up to 600 px high; it grows with the height."""
 
 SMALL = 20_000
-"""Number of pixels up to which a picture is drawn whole, as this takes less time than to find the part with the bodies.
-"""
+"""Most pixels of a picture that is always drawn whole, since finding the part with the bodies would take longer."""
 
 KEPT_PIXELS = 5_000_000
-"""Number of pixels in all cached backdrops: eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
+"""Most pixels of all cached backdrops together: eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Unmoving parts of a picture.
+    """Unmoving parts of a picture, which are cached.
 
     Parameters
     ----------
     room : Room
+        Part of space that is shown.
     camera : Camera
     backdrop : (height, width, 4) uint8
         Background, floor, walls and goal.
     lit_walls : list of LitWall
+        Walls that shadows can fall on.
     pane : pygame.Surface or None
-        Of the picture's size, with alpha: walls between camera and scene.
+        Walls between camera and scene, a surface of the picture's size with alpha; None: there are none.
     """
 
     room: Room
@@ -63,25 +64,26 @@ class Setting:
 
 
 class Painter:
-    """Draws frames into an array.
+    """Draws frames into a picture in memory.
 
     Parameters
     ----------
     size : (width, height)
-        [px]. Of the picture.
+        Size of the picture [px].
     camera : Camera or None
         None takes `layout.default_camera`.
     room : Room or None
-        None makes one of each frame, by `layout.make_room`. The walls are those of the frame.
+        Part of space that is shown; None makes one for each frame, by `layout.make_room`. The walls are always the
+        frame's.
     bounds : pair of (3,) float or None
-        Of `layout.make_room`.
+        Corners of a box that is in view, too, as of `layout.make_room`.
     arrows : bool
         Whether contacts, forces and torques are drawn.
 
     Attributes
     ----------
     picture : pygame.Surface
-        Overwritten by the next `paint`.
+        Picture of the last frame; the next `paint` overwrites it.
 
     Raises
     ------
@@ -101,9 +103,9 @@ class Painter:
         self._settings = OrderedDict()
 
     def _surface(self, size, layout):
-        """Picture array (height, width, 4) uint8, and a surface on the same memory.
+        """Make an array (height, width, 4) uint8, and a surface on the same memory.
 
-        Surfaces whose colours are stored in the same order are blended ten times as fast.
+        `layout` is the order of the colour channels; surfaces with equal orders are blended ten times as fast.
         """
         memory = np.zeros((size[1], size[0], 4), dtype=np.uint8)
         return memory, self._pygame.image.frombuffer(memory, size, layout)
@@ -128,7 +130,7 @@ class Painter:
         self._pygame.image.frombuffer(out, self.size, "RGB").blit(self.picture, (0, 0))
 
     def setting(self, frame):
-        """`Setting` of a frame, cached for later frames with the same walls, shapes and goal."""
+        """Unmoving parts of a frame's picture, cached for later frames with the same walls, shapes and goal."""
         key = self._key(frame)
         setting = self._settings.get(key)
         if setting is None:
@@ -168,10 +170,10 @@ class Painter:
         return self._pygame.transform.smoothscale(large, self.size, pane)
 
     def _box(self, frame, camera):
-        """Part of the picture [px], a `pygame.Rect`, outside of which the stages draw nothing.
+        """Rectangle [px] outside of which the stages draw nothing, a `pygame.Rect`.
 
-        A point at most r away from one at depth z and lateral offset x, both along the camera's axes, is at most
-        f r √(1 + (x/z)²) / (z - r) away from it in the picture, f the focal length.
+        A point at most r away from a point at depth z and lateral offset x, both along the camera's axes, is at most
+        f r √(1 + (x/z)²) / (z - r) away from it in the picture, where f is the focal length.
         """
         whole = self._pygame.Rect((0, 0), self.size)
         has_lines = len(frame.path) > 1 or (self._has_arrows and frame.has_arrows)
@@ -190,13 +192,13 @@ class Painter:
         return whole.clip((*low.tolist(), *(high - low).tolist()))
 
     def _enlarged(self, camera, box=None):
-        """Canvas with all or a part of the picture."""
+        """Copy the picture, or its part in `box`, onto the canvas at the canvas's scale; returns a `Canvas`."""
         small, large = self._parts(box)
         self._pygame.transform.scale(small, large.get_size(), large)
         return Canvas(self._canvas, camera, self._pygame)
 
     def _reduce(self, box=None):
-        """Reduce the canvas to the picture, each pixel the mean of its parts."""
+        """Copy the canvas, or its part for `box`, back to the picture; each pixel is the mean of its canvas pixels."""
         small, large = self._parts(box)
         self._pygame.transform.smoothscale(large, small.get_size(), small)
 
@@ -207,7 +209,7 @@ class Painter:
 
 
 def import_pygame():
-    """Import pygame, with `gfxdraw`; an error names the extra where it is missing."""
+    """Import pygame and its module `gfxdraw`; if it is missing, the error names the extra that installs it."""
     require("render", "pygame", purpose="rendering")
     import pygame
     import pygame.gfxdraw

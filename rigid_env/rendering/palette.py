@@ -1,4 +1,4 @@
-"""Colours, the light, and the shading of surfaces."""
+"""Colours of pictures, the direction of the light, and the shading of surfaces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WALL_OUTLINE = (124, 141, 168)
 SHADOW = (38, 50, 78)
 
 BODIES = ((58, 118, 222), (238, 150, 60), (46, 160, 140), (150, 104, 208))
-"""Colours of bodies without a colour of their own, in turn."""
+"""Colours of bodies without a colour of their own, taken in turn."""
 
 CONTACT = (222, 52, 60)
 PATH = (92, 140, 220)
@@ -30,23 +30,23 @@ LIGHT = np.array([0.50, 1.0, 0.42]) / np.linalg.norm([0.50, 1.0, 0.42])
 """Unit vector towards the light, world frame: from the right, above and the viewer's side."""
 
 SUN = 0.80
-"""Part of the light, in linear intensity, that comes from `LIGHT`."""
+"""Strength of the directional light from `LIGHT`, in linear intensity."""
 
 SKY, GROUND = 0.46, 0.26
-"""Ambient light, in linear intensity, on a face that looks straight up and straight down."""
+"""Ambient light on a face whose normal points straight up, and straight down, in linear intensity."""
 
 GLOSS, SHININESS = 0.16, 24.0
 """Strength and exponent of the highlight (Blinn 1977)."""
 
 
 def to_linear(colour):
-    """Linear intensities 0..1 of sRGB values 0..255 (IEC 61966-2-1), same shape."""
+    """Convert sRGB values 0..255 to linear intensities 0..1 (IEC 61966-2-1), in the same shape."""
     c = np.asarray(colour, dtype=np.float64) / 255.0
     return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(intensity):
-    """sRGB values 0..255, rounded to int, of linear intensities (clipped to 0..1), same shape."""
+    """Convert linear intensities, clipped to 0..1, to sRGB values 0..255 as int, in the same shape."""
     i = np.clip(intensity, 0.0, 1.0)
     c = np.where(i <= 0.0031308, 12.92 * i, 1.055 * i ** (1.0 / 2.4) - 0.055)
     return np.rint(255.0 * c).astype(np.int64)
@@ -55,17 +55,16 @@ def to_srgb(intensity):
 _LINEAR = to_linear(np.arange(256))
 _SRGB_STEPS = 65535
 _SRGB = to_srgb(np.arange(_SRGB_STEPS + 1) / _SRGB_STEPS)
-"""Tables of both conversions, as powers take long; neighbours differ by 255 · 12.92 / 65535 = 0.05 of a level at most.
-"""
+"""Table of sRGB values, since powers are slow; neighbours differ by at most 255 · 12.92 / 65535 = 0.05 levels."""
 
 
 def shade(colours, normals, towards_eye):
-    """Colours of flat faces in the light: Lambert, an ambient that grows towards the sky, and a highlight.
+    """Colours of flat faces in the light: Lambert's law, ambient light that is stronger from above, and a highlight.
 
     Parameters
     ----------
     colours : (n, 3) or (3,) float
-        sRGB, 0..255, of the surface; rounded here.
+        Surface colours, sRGB, 0..255; rounded here.
     normals : (n, 3) float
         Outward unit normals, world frame.
     towards_eye : (n, 3) float
@@ -88,5 +87,5 @@ def shade(colours, normals, towards_eye):
 
 @lru_cache(maxsize=256)
 def mix(colour, other, part):
-    """sRGB colour `part` (0..1) of the way from `colour` to `other`, a tuple of int."""
+    """Mix two sRGB colours: `part` (0 to 1) of `other`, and the rest of `colour`; returns a tuple of int."""
     return tuple(round((1.0 - part) * a + part * b) for a, b in zip(colour, other))

@@ -1,4 +1,4 @@
-"""Pictures of any `physics.World`: frames, a stroboscopic picture, PNG and GIF files."""
+"""Pictures of any `physics.World`: frames for the renderer, a stroboscopic picture, PNG and GIF files."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
 from rigid_env.rendering.geometry import rotation_matrix
 
 WEIGHT_ARROW = 2.5  # length of the arrow of a force as large as the weight of body 0 [m]
-FULL_CHANGE = 40.0  # of a pixel from which on it shows a body, not the rim of a shadow [of 255]
-FAINTEST = 0.25  # opacity of the first of the stroboscopic pictures; the last one has 1
+FULL_CHANGE = 40.0  # smallest change of a pixel that shows a body instead of the rim of a shadow [of 255]
+FAINTEST = 0.25  # lower limit of the opacities in a stroboscopic picture; the last position has 1
 GIF_COLOURS = 128
-FAR_BEHIND = 1000.0  # times the distance between the camera and what it looks at
-UNIT_WEIGHT = 9.81  # stands in where no gravity acts, times the mass [m/s²]
+FAR_BEHIND = 1000.0  # distance of hidden bodies behind the camera, in distances from camera to target
+UNIT_WEIGHT = 9.81  # gravity in the unit of forces where no gravity acts [m/s²]
 
 
 def world_frame(
@@ -37,24 +37,24 @@ def world_frame(
     ----------
     world : World
     index : int
-        Of the world in its batch.
+        Index of the world in its batch.
     text : sequence of str
-        Lines in the upper left corner.
+        Lines of text in the upper left corner.
     goal : GoalView, optional
     applied : (6,) or (bodies, 6) float, optional
         Force [N] and torque [N m] on body 0, or on each body, world frame; drawn at the geometric centre.
     arrows : bool
-        False leaves out contacts and applied wrenches, and saves the time to find them.
+        False leaves out contacts and applied wrenches, and saves the time to compute contacts.
 
     Returns
     -------
     Frame
-        Bodies, walls (if they act), contact points and forces.
+        Bodies, walls (if the scene has contact), contact points and forces.
 
     Raises
     ------
     ValueError
-        On an index that is not of a world.
+        If there is no world with this index.
     """
     index = validation.index(index, world.worlds, "index")
     bodies = tuple(_body_view(world, index, body) for body in range(world.body_count))
@@ -95,7 +95,7 @@ def _body_view(world: World, index: int, body: int) -> BodyView:
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:
-    """Frame with all bodies behind the camera and no contacts: its unmoving parts."""
+    """Frame whose bodies are all behind the camera and which has no contacts: it shows only the unmoving parts."""
     eye, target = np.array(camera.eye), np.array(camera.target)
     behind = eye + FAR_BEHIND * (eye - target)
     bodies = tuple(replace(body, pos=behind) for body in frame.bodies)
@@ -103,14 +103,14 @@ def without_bodies(frame: Frame, camera: Camera) -> Frame:
 
 
 def stroboscope(pictures: Sequence[np.ndarray], empty: np.ndarray) -> np.ndarray:
-    """One picture of a motion: earlier positions fainter, the last one solid on top.
+    """Join pictures of a motion to one: earlier positions are fainter, the last one is opaque and on top.
 
     Parameters
     ----------
     pictures : sequence of (height, width, 3) uint8
         In order of time, at least one.
     empty : (height, width, 3) uint8
-        The same scene without what moves.
+        Picture of the same scene without the moving bodies.
 
     Returns
     -------
@@ -124,21 +124,21 @@ def stroboscope(pictures: Sequence[np.ndarray], empty: np.ndarray) -> np.ndarray
 
 
 def write_png(path: Path, picture: np.ndarray) -> None:
-    """Write (height, width, 3) uint8 as PNG."""
+    """Write a picture (height, width, 3) uint8 as a PNG file."""
     _image_class().fromarray(picture).save(path)
 
 
 def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float, colours: int = GIF_COLOURS) -> None:
-    """Write pictures (height, width, 3) uint8 as an animated GIF that plays for ever.
+    """Write pictures (height, width, 3) uint8 as an animated GIF that repeats forever.
 
     Parameters
     ----------
     path : Path
     pictures : sequence
     fps : float
-        A GIF counts in hundredths of a second: 25, 50 and 100 are played exactly [1/s].
+        Pictures per second [1/s]. A GIF counts in hundredths of a second, so 25, 50 and 100 are played exactly.
     colours : int
-        Of all pictures together.
+        Number of colours of all pictures together.
     """
     images = [_image_class().fromarray(picture) for picture in pictures]
     palette = images[len(images) // 2].quantize(colours)

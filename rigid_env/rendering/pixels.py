@@ -1,4 +1,4 @@
-"""Pixel observations: pictures of worlds, one after the other, written into the caller's arrays."""
+"""Pixel observations: pictures of worlds that are written into the caller's arrays."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from rigid_env.rendering.picture import world_frame
 
 
 class PixelObserver:
-    """Writer of pictures without text, and by default without arrows, into arrays.
+    """Draws pictures of worlds into arrays, without text, and by default without arrows.
 
-    One observer draws any number of worlds. The picture depends on nothing but the frame: equal states give equal
-    pixels, whatever was drawn before. No window or display is needed. A pickled observer draws the same pictures: it
-    takes its settings along, and leaves pygame's surfaces and the kept backdrops behind.
+    One observer draws any number of worlds. The picture depends only on the frame: equal states give equal pixels,
+    whatever was drawn before. No window or display is needed. A pickled observer keeps its settings, and draws the same
+    pictures; pygame's surfaces and cached backdrops are made anew.
 
     Parameters
     ----------
     width, height : int
-        [px].
+        Size of the picture [px].
     camera : Camera or mapping, optional
         None looks into the room, see `Renderer`.
     room : Room, optional
-        Part of space that is shown, see `make_room`. None takes one that fits the walls and the bodies' sizes of each
-        frame: worlds with bodies of other sizes are then seen from elsewhere, and each costs a new backdrop at first.
+        Part of space that is shown, see `make_room`. None chooses one for each frame, from its walls and the bodies'
+        sizes. Worlds with other sizes are then seen from another place, and the first picture of each takes time for a
+        new backdrop.
     arrows : bool
         Whether contact points and the arrows of forces and torques are drawn.
 
     Raises
     ------
     ValueError
-        On a size that is not positive, or a camera that cannot be.
+        On a size that is not positive, or a camera with impossible parameters.
     gymnasium.error.DependencyNotInstalled
         If pygame is missing.
 
@@ -73,18 +74,19 @@ class PixelObserver:
         ----------
         frame : Frame
         out : (height, width, 3) uint8, optional
-            Array to write into, contiguous in memory, as one of a batch is. None makes a new one.
+            Array that the picture is written into, contiguous in memory, such as a part of a batch. None makes a new
+            one.
 
         Returns
         -------
         (height, width, 3) uint8
-            `out`. sRGB, row 0 on top.
+            `out`: sRGB, the top row first.
 
         Raises
         ------
         ValueError
-            If `out` is another kind of array, or the frame has no walls and neither camera nor room was given: nothing
-            would say from where to look. Nothing has been written then.
+            If `out` has another shape or type. Or if the frame has no walls, and the observer neither camera nor room,
+            so that no point of view is defined. Nothing has been written then.
         """
         out = np.empty(self.shape, dtype=np.uint8) if out is None else self._checked(out)
         if not frame.walls and self._camera is None and self._room is None:
@@ -96,14 +98,15 @@ class PixelObserver:
         return out
 
     def observe_world(self, world: World, index: int = 0, out: np.ndarray | None = None) -> np.ndarray:
-        """Draw one world of a batch, with `world_frame`; `observe` says more.
+        """Draw one world of a batch, as a frame from `world_frame`; errors as of `observe`.
 
         Parameters
         ----------
         world : World
         index : int
-            Of the world in its batch.
+            Index of the world in its batch.
         out : (height, width, 3) uint8, optional
+            As of `observe`.
 
         Returns
         -------

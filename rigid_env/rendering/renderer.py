@@ -1,4 +1,4 @@
-"""Turn frames into pixels: the order of drawing, the picture in memory, and an optional window."""
+"""Renderer: draws frames into arrays of pixels, with text, and optionally in a window."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from rigid_env.rendering.painter import Painter, import_pygame
 MODES = ("rgb_array", "human")
 
 FONT_SIZE = 15
-"""[px] for a picture 600 px high; grows with the picture."""
+"""[px] Size of the font in a picture 600 px high; it grows with the height."""
 
 
 class Renderer:
-    """Draws frames in software, into memory or a window.
+    """Draws frames in software, into an array or also in a window.
 
     Parameters
     ----------
     width, height : int
-        [px]. Of the picture.
+        Size of the picture [px].
     mode : {"rgb_array", "human"}
         "human" shows the pictures in a window too, at most `fps` a second. "rgb_array" opens no
         window and needs no display.
     fps : float
-        [1/s].
+        Most pictures per second in the window [1/s].
     title : str
-        Of the window.
+        Title of the window.
     camera : Camera, mapping or None
-        A mapping has the parameters of a `Camera`, ``{"eye": (0, 8, 20)}``. None chooses one that has the room between
-        the walls in sight: for frames with walls it depends on the walls and the bodies' sizes, without walls also on
-        the positions in the first frame drawn.
+        A mapping has the parameters of a `Camera`, ``{"eye": (0, 8, 20)}``. None chooses a camera that has the whole
+        room between the walls in view. It depends on the walls and the bodies' sizes; without walls also on the
+        bodies' positions in the first frame drawn.
     bounds : pair of (3,) float, optional
-        [m]. Lower and upper corner of a box that is in sight, too, where no wall bounds the room.
+        Lower and upper corner of a box that is in view, too, on sides of the room without a wall [m].
     arrows : bool
         False leaves out contact points and the arrows of forces and torques.
     text : bool
@@ -44,7 +44,7 @@ class Renderer:
     gymnasium.error.DependencyNotInstalled
         If pygame is missing.
     ValueError
-        On an unknown mode, a size that is not positive, or a camera that cannot be.
+        On an unknown mode, a size that is not positive, or a camera with impossible parameters.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class Renderer:
 
     @property
     def is_open(self):
-        """True while a window is shown; False before the first frame and after the user has closed it."""
+        """True while a window is open; False before the first frame and after the user has closed the window."""
         return self._window is not None
 
     def draw(self, frame):
-        """Draw a frame; in human mode show it and wait for its time.
+        """Draw a frame; in the mode "human" also show it in the window, at most `fps` pictures per second.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Renderer:
         Returns
         -------
         (height, width, 3) uint8
-            sRGB, row 0 on top. A new array.
+            New array: sRGB, the top row first.
 
         Raises
         ------
@@ -97,11 +97,11 @@ class Renderer:
         return pixels
 
     def camera(self, frame):
-        """`Camera` of `draw(frame)`; its `project(points, (width, height))` gives pixels."""
+        """Camera with which `draw` draws this frame; its `project(points, (width, height))` gives pixels."""
         return self._painter.setting(frame).camera
 
     def close(self):
-        """Close the window, if any; further calls do nothing."""
+        """Close the window, if there is one; after that, `draw` raises an error, and `close` does nothing."""
         self._is_closed = True
         self._close_window()
 
@@ -146,7 +146,7 @@ class Renderer:
 
 
 def _load_font(pygame, size):
-    """pygame's own font, or False where pygame was built without fonts: text is then left out."""
+    """pygame's default font, `size` pixels high, or False if pygame was built without fonts; text is then left out."""
     try:
         pygame.font.init()
         return pygame.font.Font(None, round(1.45 * size))

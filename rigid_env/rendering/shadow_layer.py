@@ -1,4 +1,4 @@
-"""Shadows in a picture: each pixel counts the samples of the sun that are hidden from it."""
+"""Shadows in a picture: the darkness of a pixel is the share of samples of the sun that bodies hide from it."""
 
 from __future__ import annotations
 
@@ -15,38 +15,38 @@ from rigid_env.rendering.layout import faces_point
 from rigid_env.rendering.shadows import SAMPLES, SUN_SAMPLES, fall, outlines
 
 DEPTH = 0.39
-"""Part of the light that is lost where all samples are dark."""
+"""Share of the light that is lost where all samples of the sun are hidden."""
 
 GRAZING = 0.05
-"""Least sine of the angle between light and wall for which a shadow is drawn."""
+"""Smallest sine of the angle between light and wall for which shadows are drawn on the wall."""
 
 COARSE_HEIGHT = 400
-"""[px]. In pictures at least this high, shadows are counted at half the resolution: they are soft."""
+"""[px] Height of a picture from which on shadows are computed at half the resolution, which their soft edges allow."""
 
 COVER_SIDE = 2
 COVER = COVER_SIDE**2
-"""Parts of a pixel, along each side and in all; each part belongs to one wall or none."""
+"""Number of parts of a pixel, `COVER_SIDE` along each side; each part belongs to one wall or to none."""
 
 JITTER = np.arange(1, SAMPLES + 1)[:, None] * (0.7548776662, 0.5698402910) % 1.0 - 0.5
-"""(SAMPLES, 2) [px]. Offset of each sample's polygons, spread evenly over a pixel (the R2 sequence, Roberts 2018):
-smooths the shadows' edges."""
+"""Offset (SAMPLES, 2) of each sample's polygons [px], spread evenly over a pixel (the R2 sequence, Roberts 2018). It
+smooths the edges of shadows."""
 
 DARKNESS = np.rint(255 * (1 - (1 - DEPTH) ** (np.arange(256) / (COVER * SAMPLES)))).astype(np.uint8)
-"""(256,) uint8. Alpha of a pixel by its count of samples times parts."""
+"""Opacity (256,) uint8 of the shadow at a pixel, by the number of its hidden samples times its parts on a wall."""
 
 
 @dataclass(frozen=True, eq=False)
 class LitWall:
-    """A wall in the picture that shadows fall on.
+    """Wall that shadows fall on, as it appears in a picture.
 
     Parameters
     ----------
     wall : WallView
     cover : (height, width) uint8
-        Parts of each pixel, of `COVER`, in which the wall is seen.
+        Number of parts of each pixel, out of `COVER`, that show the wall.
     sides : (k, 3) float64
     offsets : (k,) float64
-        Half-spaces sides·x ≥ offsets that cut what is seen out of the wall's plane; unit normals.
+        Half-spaces sides·x ≥ offsets that bound the visible part of the wall's plane; sides are unit normals.
     """
 
     wall: object
@@ -56,18 +56,18 @@ class LitWall:
 
     @cached_property
     def stretch(self):
-        """Largest 1 / (normal·light): longest semi-axis of the shadow of a sphere with radius 1."""
+        """Largest 1 / (normal·light) over all samples of the sun: longest semi-axis of a unit sphere's shadow."""
         return 1.0 / np.min(SUN_SAMPLES @ self.wall.normal)
 
     @cached_property
     def drift(self):
-        """Farthest that the shadow of a point 1 m above the wall moves from light to light, from the middle [m]."""
+        """Largest distance of a point's shadows from their middle, over all samples of the sun, per height [m/m]."""
         middle = palette.LIGHT / (palette.LIGHT @ self.wall.normal)
         return np.linalg.norm(SUN_SAMPLES / (SUN_SAMPLES @ self.wall.normal)[:, None] - middle, axis=1).max()
 
 
 def lit_walls(camera, size, room, pygame):
-    """List of `LitWall` of a `Room` for a `ShadowLayer` of `size` (width, height) [px]."""
+    """Walls of a `Room` that shadows can fall on, as `LitWall` for a `ShadowLayer` of `size` (width, height) [px]."""
     width, height = size
     labels = np.zeros((height * COVER_SIDE, width * COVER_SIDE), dtype=np.uint8)
     fine = (width * COVER_SIDE, height * COVER_SIDE)
@@ -85,7 +85,7 @@ def lit_walls(camera, size, room, pygame):
 
 
 def _side_planes(polygon, normal):
-    """Half-spaces, unit normals (k, 3) and offsets (k,), that cut a convex polygon (k, 3) out of its plane."""
+    """Half-spaces that bound a convex polygon (k, 3) in its plane: unit normals (k, 3) and offsets (k,)."""
     sides = np.cross(normal, np.roll(polygon, -1, axis=0) - polygon)
     sides /= np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-12)
     offsets = np.sum(sides * polygon, axis=1)
@@ -94,18 +94,18 @@ def _side_planes(polygon, normal):
 
 
 class ShadowLayer:
-    """Darkens the walls of a picture under the bodies.
+    """Layer that darkens the walls of a picture where bodies hide the sun.
 
     Parameters
     ----------
     size : (width, height)
-        [px]. Of the picture.
+        Size of the picture [px].
     pygame : module
 
     Attributes
     ----------
     size : (width, height)
-        [px]. Of the layer, which `lit_walls` have to be of, too.
+        Size of the layer [px]; the `lit_walls` that are drawn need the same size.
     """
 
     def __init__(self, size, pygame):
@@ -120,7 +120,7 @@ class ShadowLayer:
         self._fine_surface = pygame.image.frombuffer(np.zeros((size[1], size[0], 4), dtype=np.uint8), size, "RGBA")
 
     def draw(self, picture, camera, walls, frame):
-        """Darken a surface.
+        """Darken a picture where the bodies of a frame cast shadows on walls.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class ShadowLayer:
             self._blend(picture, top, bottom)
 
     def _blend(self, picture, top, bottom):
-        """Darken a picture by rows of the shade."""
+        """Darken a picture by the layer's rows from `top` to `bottom`."""
         width, step = self.size[0], self._step
         shade = self._shade_surface.subsurface((0, top, width, bottom - top))
         if step > 1:
@@ -149,9 +149,9 @@ class ShadowLayer:
         picture.blit(shade, (0, step * top))
 
     def _add_wall(self, camera, lit, poses, groups):
-        """Count the samples that are dark on one wall; returns the rows of pixels that it may have darkened, or None.
+        """Count the hidden samples at the pixels of one wall; returns the range of rows that may be darkened, or None.
 
-        Whole rows are added up, since contiguous memory saves more time than skipping the rows' ends.
+        Whole rows are added, since contiguous memory saves more time than leaving out the ends of rows.
         """
         may_show = _may_show(lit, poses)
         drawn = []
@@ -169,7 +169,7 @@ class ShadowLayer:
         return top, bottom
 
     def _count_samples(self, drawn, mask, count):
-        """Draw the polygons of a sample, add up, clear, and continue with the next sample."""
+        """Count at each pixel the samples of the sun whose polygons in `drawn` cover it; writes `count`."""
         draw, surface = self._pygame.draw.polygon, self._mask_surface
         count.fill(0)
         for _ in range(SAMPLES):
@@ -181,18 +181,19 @@ class ShadowLayer:
             mask.fill(0)
 
     def _project(self, camera, fallen):
-        """Polygons to draw, of fallen outlines (n, SAMPLES, k, 3) [m].
+        """Project the shadows of bodies on a wall, (n, SAMPLES, k, 3) [m], to polygons in pixels.
 
         Returns
         -------
         list of (number, polygons, low, high)
-            The next `number` of the iterator `polygons` belong to the next sample; all lie in the rows `low` to `high`.
+            The next `number` polygons of the iterator `polygons` belong to the next sample; all lie in the rows `low`
+            to `high`.
         """
         shape = fallen.shape[:3]
         pixels, depths = camera.project(fallen.reshape(-1, 3), self.size)
         pixels, depths = pixels.reshape(*shape, 2), depths.reshape(shape)
         far = 4 * max(self.size)
-        # a comparison with the place of a point behind the camera, which is not a number, is False
+        # pixels of points behind the camera are NaN, and comparisons with NaN are False
         is_whole = ((pixels < far) & (pixels > -far)).all(axis=(1, 2, 3)) & (depths > NEAR).all(axis=(1, 2))
         found = [self._clip(camera, body) for body in fallen[~is_whole]]
         if is_whole.any():
@@ -203,7 +204,7 @@ class ShadowLayer:
         return found
 
     def _clip(self, camera, loops):
-        """Clip the polygons of one body that is only partly in sight."""
+        """Project and clip the shadows (SAMPLES, k, 3) [m] of a body that is only partly in view, like `_project`."""
         clipped = [np.floor(camera.project_polygon(loop, self.size) + shift) for loop, shift in zip(loops, JITTER)]
         y = np.concatenate([polygon[:, 1] for polygon in clipped])
         low, high = (int(y.min()), int(y.max())) if len(y) else (0, -1)
@@ -211,13 +212,13 @@ class ShadowLayer:
 
 
 def _shrunk(polygons):
-    """Polygons (n, SAMPLES, k, 2) half a pixel smaller on all sides, as pygame fills pixels on the border, too."""
+    """Shrink polygons (n, SAMPLES, k, 2) by half a pixel on all sides, as pygame also fills pixels on the border."""
     extent = np.maximum(np.ptp(polygons[:, :1], axis=2, keepdims=True), 1.0)
     return polygons - (polygons - polygons.mean(axis=2, keepdims=True)) / extent
 
 
 def _may_show(lit, poses):
-    """(n,) bool: bodies whose bounding spheres' shadows reach into the part of a wall that is seen."""
+    """Flags (n,) bool of the bodies whose shadow may reach the visible part of a wall, by their bounding spheres."""
     wall = lit.wall
     heights = poses.pos @ wall.normal - wall.offset
     fallen = poses.pos - heights[:, None] * (palette.LIGHT / (palette.LIGHT @ wall.normal))

@@ -1,7 +1,7 @@
-"""Soft shadows of convex bodies on walls: sharp at contacts, soft above, from samples of a sun with a disc.
+"""Soft shadows of convex bodies on walls, from samples of a sun with a disc: sharp at contacts, softer at a distance.
 
-Every sample of the sun is a light of its own: the `outlines` of the bodies along it `fall` onto a wall as convex
-polygons. `shadow_layer` draws them.
+Each sample of the sun is a light of its own. The outlines of bodies as seen from it, from `outlines`, are projected
+onto a wall as convex polygons, by `fall`. `shadow_layer` draws them.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from rigid_env.rendering.meshes import body_mesh, unit_mesh
 
 SAMPLES = 16
 SUN_RADIUS = 0.085
-"""Tangent of half the sun's angular diameter; the real one's is 0.0047, but a softer shadow looks better."""
+"""Tangent of half the sun's angular diameter; that of the real sun is 0.0047, but a softer shadow looks better."""
 
 OUTLINE_POINTS = 16
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
 def _sun_samples():
-    """(SAMPLES, 3) unit vectors towards points spread evenly over the sun's disc (Vogel 1979)."""
+    """Unit vectors (SAMPLES, 3) towards points spread evenly over the sun's disc (Vogel 1979)."""
     u, v = plane_axes(palette.LIGHT)
     k = np.arange(SAMPLES)
     radius, angle = SUN_RADIUS * np.sqrt((k + 0.5) / SAMPLES), k * GOLDEN_ANGLE
@@ -32,14 +32,14 @@ def _sun_samples():
 SUN_SAMPLES = _sun_samples()
 
 HEXAGONS = np.array([[c ^ 4, c ^ 6, c ^ 2, c ^ 3, c ^ 1, c ^ 5] for c in range(8)])
-"""(8, 6). Corners of a block round its outline, in order, as seen from above corner c; see `meshes.BLOCK_FACES`."""
+"""Corners (8, 6) of a block's outline in order, as seen from a direction above corner c; see `meshes.BLOCK_FACES`."""
 
 _ANGLES = 2.0 * np.pi * np.arange(OUTLINE_POINTS)[:, None] / OUTLINE_POINTS
 _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
 
 def outlines(frame):
-    """Outlines of a frame's bodies along the lights of the sun, bodies of one shape together.
+    """Outlines of a frame's bodies as seen from each sample of the sun; bodies of one shape are grouped.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def outlines(frame):
     Returns
     -------
     list of (members, points)
-        Indices of n bodies, and points (n, SAMPLES or 1, k, 3) float64 [m], world frame: a loop for each light, or one
-        for all.
+        Indices of n bodies, and points (n, SAMPLES or 1, k, 3) float64 [m], world frame: a closed loop of k points for
+        each sample, or one loop for all samples.
     """
     members = {"block": [], "round": [], "hull": []}
     for index, body in enumerate(frame.bodies):
@@ -65,17 +65,17 @@ def outlines(frame):
 
 
 def _block_outlines(pos, R, size):
-    """A block's corners except the one nearest to the light and its opposite."""
+    """Outlines of blocks: all corners except the one nearest to the light and the opposite one."""
     corners = pos[:, None] + (unit_mesh("block").vertices * size[:, None]) @ np.swapaxes(R, 1, 2)
     top = (SUN_SAMPLES @ R > 0.0) @ (4, 2, 1)
     return corners[np.arange(len(pos))[:, None, None], HEXAGONS[top]]
 
 
 def _round_outlines(pos, R, size):
-    """Outline of a round body: one loop for all lights.
+    """Outlines of spheres and ellipsoids: one loop for all samples of the sun.
 
-    On an ellipsoid x = R A u, |u| = 1, light grazes where its normal R A⁻¹ u is perpendicular to the light: the great
-    circle of u perpendicular to A⁻¹ Rᵀ light.
+    A point of the surface is x = R A u with |u| = 1. Light is tangent to the surface where its normal R A⁻¹ u is
+    perpendicular to the light: on the great circle of u perpendicular to A⁻¹ Rᵀ light.
     """
     u, v = perpendiculars((palette.LIGHT @ R) / size)
     circles = _COSINES * u[:, None] + _SINES * v[:, None]
@@ -83,7 +83,7 @@ def _round_outlines(pos, R, size):
 
 
 def _hull_outlines(body, R):
-    """Outlines of hulls: hulls of their corners in the planes perpendicular to the lights."""
+    """Outlines of one hull: for each sample of the sun the convex hull of its corners, projected along the light."""
     corners = body.pos + body_mesh(body).vertices @ R.T
     loops = []
     for light in SUN_SAMPLES:
@@ -95,12 +95,12 @@ def _hull_outlines(body, R):
 
 
 def fall(points, wall, lights):
-    """Points where light through other points meets a wall.
+    """Project points onto a wall along the directions of lights: the shadows of the points.
 
     Parameters
     ----------
     points : (n, 3) or (..., s, n, 3) float
-        [m], world frame. The same for all lights, or of each its own.
+        World frame [m]; the same points for all lights, or n points for each.
     wall : WallView
     lights : (s, 3) float
         Unit vectors towards the light, with normal·light > 0.
@@ -108,7 +108,7 @@ def fall(points, wall, lights):
     Returns
     -------
     (..., s, n, 3) float64
-        [m], world frame, on the wall.
+        Points on the wall, world frame [m].
     """
     heights = points @ wall.normal - wall.offset
     return points - heights[..., None] * (lights / (lights @ wall.normal)[:, None])[:, None, :]

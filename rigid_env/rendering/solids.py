@@ -1,4 +1,4 @@
-"""Pose, light and project the meshes of all bodies before the camera, bodies of one shape at once."""
+"""Meshes of all bodies in the camera's view: posed, lit and projected, bodies of one shape at once."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from rigid_env.rendering.geometry import perpendiculars, unit_vectors
 from rigid_env.rendering.meshes import Mesh, body_mesh, unit_mesh
 
 OCTANT_LIGHTENING = 0.42
-"""Lightening of every second octant of a round body, which makes its rotation visible."""
+"""Share of white in every second octant of a round body, which makes its rotation visible."""
 
 FACET, FEW = 8.0, 16
-"""[px] of the picture. Longest facet of a round body, within `SUBDIVISIONS`, and number of bodies up to which it holds.
-With more than `FEW` round bodies the length grows, so that the number of all facets stays."""
+"""Longest edge of a round body's facets [px of the picture], and the number of round bodies up to which it is used.
+With
+more of them the length grows, so that the total number of facets stays the same."""
 
 SUBDIVISIONS = (4, 6, 8, 10, 12)
-"""Subdivisions of a round body's mesh (`meshes.SPHERE_SUBDIVISIONS`); coarse where the body is small in the picture."""
+"""Allowed subdivisions of a round body's mesh (`meshes.SPHERE_SUBDIVISIONS`); small bodies in the picture get fewer."""
 
 RIM_POINTS = 32
 """Number of points in the outline of a round body."""
@@ -35,19 +36,19 @@ class Solid:
     Parameters
     ----------
     mesh : Mesh
-        Its faces and edges; its vertices are those of the unit shape.
+        Mesh of the unit shape, for its faces and edges.
     vertices : (v, 3) float64
-        [m]. World frame.
+        Vertices of the body, world frame [m].
     pixels : (v, 2) float64
-        [px]. On the canvas.
+        Vertices on the canvas [px].
     is_visible : (f,) bool
-        Faces that look to the camera.
+        Faces that face the camera.
     colours : (f,) int
-        Of the visible faces in the light, as the canvas stores them.
+        Colours of the visible faces in the light, in the canvas's format.
     rim : (k, 2) float64 or None
-        [px]. Of a round body: its outline on the canvas, in order.
+        Outline of a round body on the canvas, in order [px]; None for other bodies.
     is_whole : bool
-        Whether all of it can be drawn as it is projected.
+        Whether the body can be drawn without clipping.
     """
 
     mesh: Mesh
@@ -60,16 +61,16 @@ class Solid:
 
 
 def pose(canvas, frame, colours, rim_width, face_tint=None):
-    """Pose the bodies of a frame before a canvas's camera.
+    """Pose, light and project the bodies of a frame for a canvas.
 
     Parameters
     ----------
     canvas : Canvas
     frame : Frame
     colours : (n, 3) float
-        sRGB of the bodies before light, 0..255.
+        sRGB of the bodies before shading, 0..255.
     rim_width : float
-        [units] of the canvas. Of the line round a round body, which lies half outside and half on it.
+        Width of the line around a round body [canvas units]; the line lies half outside of the body and half on it.
     face_tint : (face, colour) or None
         Another colour of one face of body 0.
 
@@ -77,7 +78,7 @@ def pose(canvas, frame, colours, rim_width, face_tint=None):
     -------
     solids : list of Solid
     depths : (n,) float64
-        [m]. Of the bodies along the line of sight.
+        Depths of the bodies along the line of sight [m].
     """
     _, depths = canvas.project(frame.poses.pos)
     groups = {}
@@ -92,7 +93,7 @@ def pose(canvas, frame, colours, rim_width, face_tint=None):
 
 
 def _meshes(canvas, bodies, depths):
-    """Unit mesh of each body; hulls have their own."""
+    """Yield the unit mesh of each body; a hull has a mesh of its own size."""
     focal = canvas.camera.focal(canvas.size[1]) / canvas.scale
     count = sum(body.kind in ("sphere", "ellipsoid") for body in bodies)
     facet = FACET * max(1.0, count / FEW) ** 0.5
@@ -108,7 +109,7 @@ def _meshes(canvas, bodies, depths):
 
 
 def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
-    """Make the solids of bodies that share a mesh."""
+    """Yield the `Solid` of each of the bodies `members`, which share a mesh."""
     eye = np.array(canvas.camera.eye)
     pos, R, size = (array[members] for array in (frame.poses.pos, frame.poses.rotation, frame.poses.size))
     turned = np.swapaxes(R, 1, 2)
@@ -117,7 +118,7 @@ def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
     rims = None
     if mesh.is_smooth:
         rims = _rims(canvas, pos, R, size, eye, rim_width)
-        # the mesh ends where the line round it begins
+        # the mesh ends at the inner border of the line around it
         half = 0.5 * rim_width * canvas.unit / canvas.camera.focal(canvas.size[1])
         size = size - np.minimum(half * np.linalg.norm(eye - pos, axis=1)[:, None], 0.4 * size)
     vertices = pos[:, None] + (mesh.vertices * size[:, None]) @ turned
@@ -135,7 +136,7 @@ def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
 
 
 def _light(canvas, mesh, normals, towards_eye, is_visible, colours, face_tint):
-    """Lit colours (n, f) int of the visible faces, as the canvas stores them."""
+    """Colours (n, f) int of n bodies' visible faces in the light, in the canvas's format; 0 for invisible faces."""
     body, face = np.nonzero(is_visible)
     surface = colours[body]
     if mesh.is_smooth:
@@ -151,10 +152,10 @@ def _light(canvas, mesh, normals, towards_eye, is_visible, colours, face_tint):
 
 
 def _rims(canvas, pos, R, size, eye, width):
-    """Outlines (n, k, 2) [px] of ellipsoids, moved outwards by half a line's width.
+    """Outlines (n, k, 2) of ellipsoids on the canvas [px], moved outwards by half a line's width.
 
-    In the frame in which the ellipsoid x = pos + R A u is the unit sphere |u| = 1 the eye is at w = A⁻¹ Rᵀ (eye - pos),
-    and lines of sight graze where u·w = 1: on a circle round w / |w|², of radius √(1 - 1/|w|²).
+    In the frame in which the ellipsoid x = pos + R A u is the unit sphere |u| = 1, the eye is at w = A⁻¹ Rᵀ (eye -
+    pos). Lines of sight are tangent to it where u·w = 1: on a circle around w / |w|², of radius √(1 - 1/|w|²).
     """
     w = np.einsum("nij,ni->nj", R, eye - pos) / size
     square = np.maximum(np.sum(w * w, axis=1), 1.0)[:, None]

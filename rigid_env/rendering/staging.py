@@ -1,4 +1,4 @@
-"""Place a motion before the camera: upright, at a size that can be drawn, and all of it in sight."""
+"""Arrange a motion for a picture: turned upright, scaled to a size that can be drawn, and all of it in view."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ from rigid_env.rendering.camera_argument import as_camera, upwards
 from rigid_env.rendering.geometry import rotation_matrix
 
 Y = np.array((0.0, 1.0, 0.0))
-FAR_SPAN = 40.0  # largest extent of a motion that is shown whole, in sizes of its largest body
-SIGHT = 100.0  # further from the origin than this the camera travels with the bodies [m]
-DRAWN_SIZE = 2.0  # a largest body smaller than this is drawn that large [m]
-LONGEST_ARROW = 0.3  # of the extent of the picture
-MOST_ARROWS = 16  # contact points; of more of them no forces are drawn
+FAR_SPAN = 40.0  # largest extent of a motion that is shown whole, in extents of its largest body
+SIGHT = 100.0  # distance of a body from the origin beyond which the picture travels with body 0 [m]
+DRAWN_SIZE = 2.0  # least extent of the largest body as it is drawn; smaller scenes are enlarged [m]
+LONGEST_ARROW = 0.3  # length of the longest arrow, in extents of the drawn motion
+MOST_ARROWS = 16  # most contact points that are drawn; if there are more, none is drawn
 
-# Of the flight of one body that goes further than `FAR_SPAN`, which is shown whole, with its path.
-FLIGHT_CELLS = 8  # strong lines of the grid that the flight is longer than, at most
-FLYING_SIZE = 1.6  # of the body as it is drawn, where 5 is a cell of the grid [m]
-FLIGHT_DEPTH = 0.15  # least half width of the ground, in lengths of the flight
-FAR_WALL = 2.0  # distance from the middle of the flight from which on a wall is left out, in lengths of the flight
-PATH_POINTS = 600  # at most
+# A single body that flies further than `FAR_SPAN` is shown with its whole path. These constants are for such a flight.
+FLIGHT_CELLS = 8  # most grid cells along the flight
+FLYING_SIZE = 1.6  # least extent of the body as it is drawn, where a grid cell is 5 [m]
+FLIGHT_DEPTH = 0.15  # least half width of the drawn ground, in lengths of the flight
+FAR_WALL = 2.0  # largest distance of a drawn wall from the middle of the flight, in lengths of the flight
+PATH_POINTS = 600  # most points of a drawn path
 
 
 @dataclass(frozen=True)
 class Shot:
-    """View of a motion in pictures.
+    """Camera position and arrows of a picture, as a user chooses them.
 
     Parameters
     ----------
     eye : (3,) float, optional
-        Place of the camera, world frame of the scene [m]. None: chosen so that the motion is in sight.
+        Position of the camera, world frame of the scene [m]. None: chosen so that the whole motion is in view.
     target : (3,) float, optional
-        Place in the middle of the picture [m]. None: the middle of the motion.
+        Point in the middle of the picture [m]. None: the middle of the motion.
     arrows : bool
         Whether contact points and forces are drawn.
     """
@@ -48,27 +48,27 @@ class Shot:
 
 
 CHOSEN = Shot()
-"""View of all of the motion."""
+"""Default shot: the whole motion in view, with arrows."""
 
 
 class Stage:
-    """One camera's view of a whole motion.
+    """Arrangement of a whole motion for pictures: rotation, scale and shift that are the same for all frames.
 
     Parameters
     ----------
     scene : Scene
-        Its gravity says which of the axes is up.
+        Scene of the motion; its gravity defines which axis is up.
     frame : Frame
-        The world at any time.
+        Frame of the world at any time, for sizes and walls.
     pos : (samples, bodies, 3) float
-        Positions over the motion, world frame [m].
+        Positions of the bodies over the motion, world frame [m].
 
     Attributes
     ----------
     bounds : pair of (3,) float or None
         Lower and upper corner of the drawn motion [m]. None: the picture travels with body 0.
     notes : tuple of str
-        Lines that say what is not to scale.
+        Lines of text for the picture, such as the scale of the grid.
     """
 
     def __init__(self, scene: Scene, frame: Frame, pos: np.ndarray):
@@ -90,7 +90,7 @@ class Stage:
             self._show_flight(frame, np.asarray(pos)[:, 0] @ self._matrix.T)
 
     def _show_flight(self, frame: Frame, path: np.ndarray) -> None:
-        """Show all of a flight along `path` (samples, 3) [m]; near walls, enlarge the body as far as possible."""
+        """Arrange the flight of one body with its whole path (samples, 3) [m] in view; the body may be enlarged."""
         lower, upper = path.min(axis=0), path.max(axis=0)
         span, size = float((upper - lower).max()), _extent(frame.bodies[0])
         cell = _round_up(span / FLIGHT_CELLS)
@@ -107,10 +107,10 @@ class Stage:
         self.notes = (f"grid {cell:g} m{larger}" if self._ground else f"flight {span:.3g} m across{larger}",)
 
     def place(self, frame: Frame, share: float = 1.0) -> Frame:
-        """Place a frame of the motion for drawing.
+        """Transform a frame of the motion for drawing.
 
-        Where one body goes far, its path is in the picture, the first `share` of it (0 to 1). Where several go too far
-        to be shown whole, the picture is without walls and travels with body 0.
+        The picture of a single far-flying body contains the first `share` (0 to 1) of its path. If several bodies go
+        too far to be shown whole, the picture has no walls and travels with body 0.
         """
         matrix, scale = self._matrix, self._scale
         bodies = [self._placed(body) for body in frame.bodies]
@@ -129,15 +129,15 @@ class Stage:
         )  # fmt: skip
 
     def camera(self, shot: Shot) -> Camera | None:
-        """Camera of a shot, in the frame of `place`, with the scene's up direction upwards; None where none is chosen.
+        """Camera of a shot, in the coordinates of `place`; None if the shot has no eye.
 
-        Without a target it looks at the middle of the motion. Where the picture travels with body 0, both places are
-        counted from it.
+        The scene's up direction points upwards. Without a target, the camera looks at the middle of the motion. If the
+        picture travels with body 0, eye and target are relative to that body.
 
         Raises
         ------
         ValueError
-            The two places are one.
+            Eye and target are the same point.
         """
         if shot.eye is None:
             return None
@@ -164,13 +164,13 @@ class Stage:
 
 
 def _round_up(length: float) -> float:
-    """The next of 1, 2, 5, 10, ... that is not smaller [m]."""
+    """Smallest of 1, 2, 5, 10, ..., times any power of ten, that is not below `length` [m]."""
     power = 10.0 ** math.floor(math.log10(length))
     return power * next(step for step in (1, 2, 5, 10) if step * power >= length * (1 - 1e-9))
 
 
 def _thinned(path: np.ndarray, share: float) -> np.ndarray:
-    """First `share` of a path as at most `PATH_POINTS` points, its end included."""
+    """First `share` (0 to 1) of a path, as at most `PATH_POINTS` points, with its end among them."""
     last = round(share * (len(path) - 1))
     return path[np.unique(np.linspace(0, last, min(last + 1, PATH_POINTS)).round().astype(int))]
 
@@ -180,7 +180,7 @@ def _extent(body: BodyView) -> float:
 
 
 def _upright(scene: Scene) -> np.ndarray:
-    """Quaternion (4,) of the turn of the axis nearest to up onto y; none if that is y, or without gravity."""
+    """Quaternion (4,) that rotates the axis nearest to up onto y; the identity without gravity."""
     gravity = scene.effect(Gravity)
     up = -np.asarray(gravity.acceleration) if gravity is not None else Y
     k = int(np.abs(up).argmax())
@@ -192,6 +192,6 @@ def _upright(scene: Scene) -> np.ndarray:
 
 
 def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) of the turn q, then p; scalar first."""
+    """Quaternion (4,), w first, of the rotation q followed by p."""
     a, b, c, d = p.tolist()
     return np.array(((a, -b, -c, -d), (b, a, -d, c), (c, d, a, -b), (d, -c, b, a))) @ q

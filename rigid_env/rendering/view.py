@@ -1,4 +1,4 @@
-"""Pictures of a task: the frame of each world, and the renderer that draws it."""
+"""Pictures of a task: the frame of one world, and the renderer that draws it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
 
 RenderMode = Literal["rgb_array", "human"]
-"""One of `RENDER_MODES`."""
+"""Type of the argument `render_mode`: one of `RENDER_MODES`."""
 
 RENDER_MODES = ("rgb_array", "human")
 
 
 def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
-    """Picture of one world of a task.
+    """Make the frame of a picture of one world of a task.
 
     Parameters
     ----------
     task : Task
     world : int
+        Index of the world in the task's batch.
     arrows : bool
         Whether contacts, forces and torques are drawn.
 
@@ -43,19 +44,19 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
 
 
 def room_of(task: Task) -> Room:
-    """Part of space shown in pictures of a task, the same for all its worlds and episodes."""
+    """Part of space that pictures of a task show, the same for all its worlds and episodes."""
     frame = world_frame(task.world, arrows=False)
     return make_room(frame.walls, frame.bodies, bounds_of(task.world.scene))
 
 
 def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner (3,) [m] of a box around all bodies where a scene declares them."""
+    """Lower and upper corner (3,) [m] of a box around all bodies of a scene, at the poses that it declares."""
     boxes = np.array([_box_of(body) for body in scene.bodies])
     return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
 
 def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3,) [m] of the box around a body: its own box, or that of its bounding sphere."""
+    """Lower and upper corner (3,) [m] of a box around a body, within the box around its bounding sphere."""
     rotation = rotation_matrix(np.array(body.quat))
     reach = np.minimum(np.abs(rotation) @ body.dimensions, body.bounding_radius(body.dimensions))
     middle = np.array(body.pos) + rotation @ np.array(body.center)
@@ -64,14 +65,14 @@ def _box_of(body: Body) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class RenderArguments:
-    """Arguments about pictures for a viewer of an environment.
+    """Arguments of an environment about its pictures.
 
     Attributes
     ----------
     render_mode : {"rgb_array", "human"} or None
         None draws nothing.
     width, height : int
-        [px].
+        Size of the picture [px].
     camera : Camera, mapping or None
         As of `rigid_env.rendering.camera_argument.as_camera`.
     arrows : bool
@@ -86,19 +87,20 @@ class RenderArguments:
 
 
 class View:
-    """View of a task's worlds; makes its renderer with the first picture, and leaves it out of pickles.
+    """Pictures of a task's worlds; the first picture makes the renderer, which pickles leave out.
 
     Parameters
     ----------
     given : RenderArguments
     fps : float
-        [1/s].
+        Most pictures per second in the window [1/s].
     title : str
+        Title of the window.
 
     Raises
     ------
     ValueError
-        On an unknown mode, a size that is not positive, or a camera that cannot be.
+        On an unknown mode, a size that is not positive, or a camera with impossible parameters.
     gymnasium.error.DependencyNotInstalled
         If there is a mode, but no pygame.
     """
@@ -117,14 +119,14 @@ class View:
         self._renderer: Renderer | None = None
 
     def draw(self, task: Task, world: int = 0) -> np.ndarray:
-        """Picture (height, width, 3) uint8 of one world; mode "human" shows it in the window, too."""
+        """Draw one world of a task: returns (height, width, 3) uint8; the mode "human" shows it in the window, too."""
         if self._renderer is None:
             bounds = bounds_of(task.world.scene)
             self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera, bounds)
         return self._renderer.draw(frame_of(task, world, self.arrows))
 
     def close(self) -> None:
-        """Close the window, if any; further calls do nothing."""
+        """Close the window, if there is one; further calls do nothing."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None

@@ -1,7 +1,8 @@
-"""Tasks, each written once over a batch of worlds: starts, goals, actions, observations, rewards, success.
+"""Tasks of reinforcement learning: each is written once, as NumPy functions over a batch of worlds.
 
-The single environment is a batch of one; the vector environment and the Stable-Baselines3 adapter are the
-batch itself. Subclass `Task` to set one of your own.
+A task declares how episodes start, their goals, actions and observations, the rewards and what counts as success. The
+single environment runs a task in a batch of one world. The vector environment and the Stable-Baselines3 adapter run it
+in a batch of many. Subclass `Task` to write a task of your own.
 """
 
 from rigid_env.tasks import compiled, observe

@@ -1,8 +1,9 @@
 """Actions on bodies: convert numbers between -1 and 1 to forces, torques and impulses.
 
-An action is a row of numbers. Each way that a task declares takes the next of them, and makes one or two vectors: their
-entries are clipped to ±1, then a vector is shortened to length 1 where it is longer, and multiplied by its limit.
-Limits are told in units of the weight m g of the body, so that a task means the same for every mass and gravity.
+An action is a row of numbers. A task lists its actuations: `Wrench`, `Force` and `Impulse`. Each of them takes the next
+numbers of the row and turns them into one or two vectors. First each number is clipped to ±1. Then a vector that is
+longer than 1 is shortened to length 1, and multiplied by its limit. Limits are given in units of the weight m g of the
+body, so that the same action has the same effect for every mass and gravity.
 """
 
 from __future__ import annotations
@@ -22,21 +23,23 @@ FORCE, TORQUE, IMPULSE = 0, 1, 2  # kinds of a vector
 
 
 class Vector(NamedTuple):
-    """One vector of an action.
+    """One force, torque or impulse that an action sets.
 
     Attributes
     ----------
     kind : int
         FORCE, TORQUE or IMPULSE.
     body : int
+        Index of the body that the vector acts on.
     axes : str
-        Axes that the action has numbers for, of "xyz".
+        Axes along which the action sets the vector, letters of "xyz"; the other components are 0.
     share : float
-        Longest force over the weight, torque over weight times reach, impulse over weight times 1 s.
-    frame : str
-        Of the vector.
+        Largest length: of a force over the weight m g, of a torque over m g times the body's reach, of an impulse over
+        m g times 1 s.
+    frame : {"world", "body"}
+        Frame of the axes.
     point : (3,) tuple or None
-        Where it acts, body frame, from the centre of mass [m]; None: at the centre of mass.
+        Point of the body at which the vector acts, body frame, from the centre of mass [m]; None: the centre of mass.
     """
 
     kind: int
@@ -48,14 +51,14 @@ class Vector(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Names of the vector's numbers, for tables."""
+        """Names of the vector's numbers for tables, such as "force along x"."""
         what = {FORCE: "force along", TORQUE: "torque about", IMPULSE: "impulse along"}[self.kind]
         axes = "" if self.frame == "world" else "body axis "
         return [f"{what} {axes}{axis}" for axis in self.axes]
 
     @property
     def unit(self) -> str:
-        """Unit of the vector's numbers, for tables: m mass of the body, g gravity, a its reach."""
+        """Unit of the vector's numbers for tables, where m is the body's mass, g gravity, and a the body's reach."""
         return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
 
     @property
@@ -68,26 +71,28 @@ class Vector(NamedTuple):
 
 @dataclass(frozen=True)
 class Wrench:
-    """A force at the centre of mass and a torque: six numbers, or fewer axes.
+    """A force at a body's centre of mass and a torque: six numbers of an action, or fewer if axes are left out.
 
     Parameters
     ----------
     body : int
+        Index of the body.
     force : float
-        Longest force over the weight of the body; 0: no force.
+        Largest force over the weight of the body; 0: no force.
     torque : float
-        Longest torque over the weight times the body's reach, which is its longest half extent, and of a hull the
-        farthest along a body axis from the centre of mass; 0: no torque.
+        Largest torque over the weight times the body's reach; 0: no torque. The reach is the longest half extent; of a
+        hull it is the largest distance from the centre of mass along a body axis.
     force_axes, torque_axes : str
-        Axes that the agent has in hand, of "xyz".
+        Axes along which the agent can act, letters of "xyz".
     frame : {"world", "body"}
+        Frame of the axes.
     agent : str
-        Name of the agent whose numbers these are.
+        Name of the agent that chooses these numbers.
 
     Raises
     ------
     ValueError
-        A number below 0, both of them 0, or unknown axes or frame.
+        A negative number, force and torque both 0, or unknown axes or frame.
     """
 
     body: int = 0
@@ -110,7 +115,7 @@ class Wrench:
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
-        """Force and torque, without those whose limit is 0."""
+        """Force and torque as `Vector`, without the one whose limit is 0."""
         both = (
             Vector(FORCE, self.body, self.force_axes, float(self.force), self.frame),
             Vector(TORQUE, self.body, self.torque_axes, float(self.torque), self.frame),
@@ -120,25 +125,27 @@ class Wrench:
 
 @dataclass(frozen=True)
 class Force:
-    """A force at a point of a body.
+    """A force at a point of a body: one number of an action for each axis.
 
     Parameters
     ----------
     body : int
+        Index of the body.
     strength : float
-        Longest force over the weight of the body.
+        Largest force over the weight of the body.
     point : (3,) float
-        Where it acts, along the body axes from the centre of mass [m].
+        Point at which the force acts, body frame, from the centre of mass [m].
     axes : str
-        Axes that the agent has in hand, of "xyz".
+        Axes along which the agent can push, letters of "xyz".
     frame : {"world", "body"}
-        Of the force.
+        Frame of the axes; `point` is always in the body frame.
     agent : str
+        Name of the agent that chooses these numbers.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -158,27 +165,28 @@ class Force:
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
-        """The force."""
+        """The force as the only `Vector`."""
         point = self.point if any(self.point) else None
         return (Vector(FORCE, self.body, self.axes, float(self.strength), self.frame, point),)
 
 
 @dataclass(frozen=True)
 class Impulse:
-    """An impulse at a point of a body at the start of the control step: it acts during the first physics step.
+    """An impulse at a point of a body at the start of a control step; it acts as a force during the first physics step.
 
     Parameters
     ----------
     body : int
+        Index of the body.
     strength : float
-        Longest impulse over the weight of the body times 1 s: with 0.1 the body gains up to 0.1 g · 1 s of speed.
+        Largest impulse over the weight of the body times 1 s: with 0.1 the body gains at most 0.1 g · 1 s of speed.
     point, axes, frame, agent
-        As of `Force`.
+        As in `Force`.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -192,48 +200,56 @@ class Impulse:
 
     @property
     def vectors(self) -> tuple[Vector, ...]:
-        """The impulse."""
+        """The impulse as the only `Vector`."""
         point = self.point if any(self.point) else None
         return (Vector(IMPULSE, self.body, self.axes, float(self.strength), self.frame, point),)
 
 
 def check_body(body) -> None:
-    """Raise a ValueError unless `body` is an index."""
+    """Raise a ValueError unless `body` is an integer of at least 0."""
     if isinstance(body, bool) or not isinstance(body, (int, np.integer)) or body < 0:
         raise ValueError(f"body is {body!r}; allowed are indices of bodies, from 0 on")
 
 
 def check_axes(field: str, axes) -> None:
-    """Raise a ValueError unless `axes` are some of "xyz", in this order."""
+    """Raise a ValueError unless the text `axes` has one to three letters of "xyz", in this order.
+
+    `field` is the name of the argument in the error.
+    """
     if not isinstance(axes, str) or not axes or axes != "".join(axis for axis in AXES if axis in axes):
         raise ValueError(f"{field} is {axes!r}; allowed are axes of 'xyz', in this order")
 
 
 class ActionTable:
-    """The vectors of a task's actions as arrays, for `kernels.write_wrenches`.
+    """Arrays that describe the vectors of a task's actions, for the kernels of `rigid_env.tasks.wrenches`.
 
     Parameters
     ----------
     ways : sequence of Wrench, Force and Impulse
+        Actuations that the task declares, or a single one.
     body_count : int
+        Bodies of the scene.
 
     Attributes
     ----------
     size : int
-        Numbers of an action.
+        Length of an action.
     vectors : list of Vector
+        Forces, torques and impulses that an action sets.
     table : (vectors, 6) int64
-        Kind, body, index of the number for x, y and z (-1: none), and whether the vector is in the body frame.
+        A row for each vector: its kind, its body, the indices in the action of its x, y and z (-1: no number, always
+        0), and 1 if the vector is in the body frame.
     points : (vectors, 3) float64
-        [m], body frame.
+        Points at which the vectors act, body frame, from the centre of mass [m].
     has_impulses : bool
+        Whether one of the vectors is an impulse.
     agents : dict of str to (k,) int64
-        Which numbers of an action belong to which agent.
+        Indices of the action's numbers that each agent chooses, by the agent's name.
 
     Raises
     ------
     ValueError
-        No ways, one that is none, or a body that is not there.
+        No actuation, an object of another class, or a body that is not in the scene.
     """
 
     def __init__(self, ways, body_count: int):
@@ -262,19 +278,19 @@ class ActionTable:
         self.agents = {agent: np.array(places) for agent, places in agents.items()}
 
     def limits(self, weight: np.ndarray, reach: np.ndarray, first_dt: float) -> np.ndarray:
-        """Largest lengths of the vectors.
+        """Largest length of each vector in each world.
 
         Parameters
         ----------
         weight, reach : (worlds, bodies) float64
-            Weights m g [N], and reaches [m].
+            Weight m g [N] and reach [m] of each body.
         first_dt : float
-            Time in which an impulse acts, as a force [s].
+            Time during which an impulse acts as a force [s].
 
         Returns
         -------
         (worlds, vectors) float64
-            [N] of forces and, while they act, of impulses; [N m] of torques.
+            [N] for forces, [N m] for torques. An impulse is given as the force that acts during `first_dt` [N].
         """
         columns = []
         for vector in self.vectors:

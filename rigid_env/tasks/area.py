@@ -1,4 +1,4 @@
-"""The two layouts of walls, and the part of the floor for starts and goals."""
+"""Layouts of the walls in the block's tasks, and the square of the floor in which episodes start and goals lie."""
 
 from __future__ import annotations
 
@@ -13,26 +13,27 @@ from physics.annotations import Layout
 LAYOUTS = ("three", "corner")
 
 CLEARANCE = 0.25
-"""[m] Gap between a wall and a block that turns about its centre on the floor."""
+"""[m] Gap that is kept between each wall and a block that turns about the vertical through its centre."""
 
 
 @dataclass(frozen=True)
 class Area:
-    """A square of the floor, 2 `half_width` wide.
+    """A square of the floor with the side 2 `half_width`, and the walls around it.
 
-    In the layout ``three`` it is centred at the origin between the walls x = ±half_width; in the layout
-    ``corner`` it reaches from the walls x = 0 and z = 0 to 2 `half_width`.
+    In the layout ``three`` the square is centred at the origin between the walls x = ±half_width. In the layout
+    ``corner`` it extends from the walls x = 0 and z = 0 to x = z = 2 `half_width`. The floor is y = 0 in both.
 
     Parameters
     ----------
     walls : {"three", "corner"}
+        Layout.
     half_width : float
-        [m].
+        Half the side of the square [m].
 
     Raises
     ------
     ValueError
-        On an unknown layout or a half width that is not positive.
+        An unknown layout, or a half width that is not positive.
     """
 
     walls: Layout
@@ -45,16 +46,24 @@ class Area:
 
     @property
     def half_spaces(self) -> list[physics.HalfSpace]:
-        """The walls, the floor first."""
+        """Walls of the layout as half-spaces, the floor first."""
         return physics.corner() if self.walls == "corner" else physics.three_walls(self.half_width)
 
     @property
     def centre(self) -> float:
-        """Both x and z of the middle [m]."""
+        """Coordinate of the square's middle [m], the same for x and z."""
         return self.half_width if self.walls == "corner" else 0.0
 
     def check_room(self, size: np.ndarray, option: str | None = None) -> None:
-        """Raise a ValueError, which names an `option` if there is one, if a block of edges `size` (3,) does not fit."""
+        """Raise a ValueError if a block has no room to turn in the area.
+
+        Parameters
+        ----------
+        size : (3,) float64
+            Edges of the block [m].
+        option : str, optional
+            Option of `reset` that gave the size; the error names it instead of `half_width`.
+        """
         radius = 0.5 * float(np.linalg.norm(size))
         if not self.half_width > radius + CLEARANCE:
             if option is not None:
@@ -68,19 +77,19 @@ class Area:
             )
 
     def spread(self, shares: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Places (x, z) at which a block is clear of the walls at any turn about the vertical.
+        """Turn uniform numbers into places of blocks that keep clear of the walls at any turn about the vertical.
 
         Parameters
         ----------
         shares : (n, 2) float64
-            In [0, 1); 0.5 is the middle.
+            Uniform numbers in [0, 1), for x and z; 0.5 is the middle.
         size : (n, 3) float64
             Edges of the blocks [m].
 
         Returns
         -------
         (n, 2) float64
-            [m].
+            x and z of the blocks' centres [m].
         """
         square = size * size
         radius = 0.5 * np.sqrt(square[:, 0] + square[:, 1] + square[:, 2])

@@ -1,4 +1,4 @@
-"""Groups of arguments that several constructors take: each is a dataclass, written once, with types and defaults."""
+"""Groups of constructor arguments as dataclasses, so that constructors share names, types and defaults."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ Group = TypeVar("Group")
 
 
 def takes(group: Callable[P, Group]) -> Callable[[Callable[[Made, Group], None]], Callable[Concatenate[Made, P], None]]:
-    """Let a constructor, written for a group of arguments, take each of them by its name and place.
+    """Let a constructor that is written for a dataclass of arguments take each field as a parameter of its own.
 
-    The group is a dataclass, often one that joins others by inheritance: fields of the last base come first. Editors,
-    type checkers, `help` and `inspect.signature` see its fields as parameters of the constructor.
+    The dataclass often joins several others by inheritance; fields of the last base come first. Editors, type checkers,
+    `help` and `inspect.signature` see the fields as parameters of the constructor.
 
     Parameters
     ----------
     group : dataclass
-        Of this constructor alone: errors of a call then name the constructor.
+        Class of the arguments. Use one class for one constructor: errors of a wrong call name that constructor.
 
     Returns
     -------
-    A decorator of ``__init__(self, given)``, where `given` is an instance of the group.
+    callable
+        Decorator of ``__init__(self, given)``, where `given` is an instance of `group`.
     """
 
     def spread(init: Callable[[Made, Group], None]) -> Callable[Concatenate[Made, P], None]:
@@ -48,20 +49,20 @@ def takes(group: Callable[P, Group]) -> Callable[[Callable[[Made, Group], None]]
 
 
 def part(given: Any, *groups: type) -> dict[str, Any]:
-    """Arguments of these groups among those given, by name, for the constructor that takes them."""
+    """Values of the fields of some `groups`, by name, from an instance of a dataclass that inherits from them."""
     return {each.name: getattr(given, each.name) for group in groups for each in fields(group)}
 
 
 @dataclass(frozen=True)
 class BatchArguments:
-    """Size of a batch; see `rigid_env.Task`."""
+    """Argument for the number of worlds in a batch; see `rigid_env.Task`."""
 
     worlds: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
 class EngineArguments:
-    """Arguments of the world of every task; see `rigid_env.Task`."""
+    """Arguments that the world of every task takes; see `rigid_env.Task`."""
 
     accuracy: Preset | physics.Accuracy = "balanced"
     effects: Iterable[Effect] = ()
@@ -71,7 +72,7 @@ class EngineArguments:
 
 @dataclass(frozen=True, kw_only=True)
 class ControlArguments(EngineArguments):
-    """Arguments of a task whose control step has a default; see `rigid_env.Task`."""
+    """Arguments of tasks with a default length of the control step; see `rigid_env.Task`."""
 
     frame_skip: int = 5
     dt: float = 0.005

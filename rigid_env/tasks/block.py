@@ -32,7 +32,7 @@ weak for the others without the force's help, momentum, or a wall."""
 
 @dataclass(frozen=True, kw_only=True)
 class BlockArguments:
-    """Arguments of the block's tasks alone; see `BlockTask`."""
+    """Arguments that only the block's tasks have; see `BlockTask`."""
 
     walls: Layout = "three"
     half_width: float = 10.0
@@ -49,9 +49,9 @@ class _Arguments(ControlArguments, BlockArguments, BatchArguments):
 
 
 class BlockTask(Task):
-    """A batch of worlds with one block each among three walls.
+    """A batch of worlds with one block each, which starts at rest on the floor among three walls.
 
-    Subclasses say what a goal is, and observe with one compiled function.
+    Subclasses define the goal, and one compiled function for observations, rewards and success.
 
     Parameters
     ----------
@@ -68,15 +68,16 @@ class BlockTask(Task):
     Attributes
     ----------
     area : Area
+        Part of the floor for starts and goals, and its walls.
     record : (worlds, RECORD_SIZE) float64
-        See `rigid_env.tasks.layout`.
+        Numbers of each world's episode, see `rigid_env.tasks.layout`.
     goal_draw : str or None
-        Name of the goal among the draws; None: there is none to draw.
+        Name of the goal among the task's draws; None: the task draws no goal.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     actions = Wrench(0, FORCE_SHARE, TORQUE_SHARE)
@@ -99,17 +100,20 @@ class BlockTask(Task):
         super().__init__(given.worlds, **part(given, ControlArguments))
 
     def declared_draws(self) -> Mapping[str, Any]:
-        """Place, yaw and face of the start, the goal, and the five parameters."""
+        """Distributions of an episode: place, yaw and face of the start, the goal, and five physical parameters."""
         start = {"place": OnFloor(self.area), "yaw": YAW, "face": Face()}
         goal = {} if self.goal_draw is None else {self.goal_draw: self.goal()}
         return {**start, **goal, **self._parameters}
 
     def goal(self) -> Distribution:
-        """Distribution of goals."""
+        """Distribution from which an episode draws its goal; a subclass with a `goal_draw` defines it."""
         raise NotImplementedError
 
     def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
-        """The block at the middle of the area, lifted clear of the floor, with the middles of all ranges."""
+        """Scene with the block at the middle of the area, above the floor, each parameter at the middle of its range.
+
+        `distributions` is not used: the block's parameters are known from the constructor.
+        """
         size, centre = scene_size(self._parameters["size"]), self.area.centre
         values = {field: float(middle(each)) for field, each in self._parameters.items() if field != "size"}
         clear = float(np.linalg.norm(self._largest))
@@ -124,7 +128,7 @@ class BlockTask(Task):
         )
 
     def place(self, drawn: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
-        """Poses at rest on the floor."""
+        """Poses of the block at rest on the floor, from the drawn place, yaw, face and size."""
         count = len(drawn["yaw"])
         pos, quat = np.empty((count, 1, 3)), np.empty((count, 1, 4))
         start_poses(drawn["place"], drawn["yaw"], drawn["face"], 0.5 * drawn["size"], pos, quat)

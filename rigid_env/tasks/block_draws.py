@@ -1,4 +1,4 @@
-"""Distributions of the block's tasks: places on the floor, faces, edges."""
+"""Distributions that the block's tasks draw from: places on the floor, faces of the block, lengths of its edges."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ FACE_COUNT = 6
 
 
 class OnFloor(Distribution):
-    """Places x, z on the floor at which a block of the episode's size has room to turn [m].
+    """Places (x, z) on the floor at which a block of the episode's size has room to turn about the vertical [m].
 
     Parameters
     ----------
     area : Area
+        Square of the floor that the places lie in.
     """
 
     length = uniforms = 2
@@ -42,7 +43,7 @@ class OnFloor(Distribution):
 
 
 class Face(Choice):
-    """A face of the block, 0 to 5 for -x, +x, -y, +y, -z, +z."""
+    """A face of the block as an integer: 0 to 5 for -x, +x, -y, +y, -z, +z."""
 
     def __init__(self):
         super().__init__(range(FACE_COUNT))
@@ -59,9 +60,9 @@ class Face(Choice):
 
 
 class OtherFace(Face):
-    """A face of the block other than `face`, the lower face at the start."""
+    """A face of the block that differs from the draw `face`, which is the face on the floor at the start."""
 
-    uniforms = 2  # of which one is used: seeds of earlier versions mean the same episodes
+    uniforms = 2  # only one is used; with the second, seeds of earlier versions give the same episodes
 
     def at(self, shares, drawn):
         return (drawn["face"] + 1.0 + np.floor((FACE_COUNT - 1) * shares[:, 0])) % FACE_COUNT
@@ -71,12 +72,14 @@ class OtherFace(Face):
 
 
 class EdgesInside(Distribution):
-    """Edges of a block that can turn inside the area [m].
+    """Edges of a block that has room to turn in the area [m].
 
     Parameters
     ----------
     edges : Distribution
+        Distribution of the three edges.
     area : Area
+        Square of the floor that the block must fit in; a size from an option of `reset` is checked.
     """
 
     length = 3
@@ -93,7 +96,7 @@ class EdgesInside(Distribution):
 
     def read(self, field, value, worlds):
         edges = self.edges.read(field, value, worlds)
-        if (edges > 0.0).all():  # others are refused as no sizes at all
+        if (edges > 0.0).all():  # other sizes are refused later, as no sizes at all
             self.area.check_room(edges[np.argmax(np.linalg.norm(edges, axis=1))], field)
         return edges
 
@@ -102,4 +105,4 @@ class EdgesInside(Distribution):
 
 
 YAW = Uniform(0.0, 2.0 * np.pi)
-"""Turn about the vertical [rad]."""
+"""Angle of the block about the vertical at the start [rad]."""

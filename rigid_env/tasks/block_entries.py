@@ -1,4 +1,4 @@
-"""Entries of the observations of the block's tasks, as the environments' docstrings have them."""
+"""Entries of the observations of the block's tasks: names, units and bounds as in the environments' docstrings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The block's tasks with goals: reach a place, turn a face down."""
+"""Goal-conditioned tasks of the block: bring it to a place, or turn a face down; for hindsight experience replay."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from rigid_env.tasks.entries import Entry
 from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.kernels import REACH_TOLERANCE, REORIENT_TOLERANCE, REST_SPEED, REST_SPIN
 
-LENGTH = 5.0  # unit of places [m]
-BOUND = 10.0  # of numbers in observations
+LENGTH = 5.0  # unit of places in observations [m]
+BOUND = 10.0  # largest number in an observation, in its unit
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
@@ -37,19 +37,22 @@ MOTION = (
 
 
 class BlockGoal(GoalTask, BlockTask):
-    """Base of the block's tasks with goals."""
+    """Base of the goal-conditioned tasks of the block; the last two numbers of a goal are speed and spin."""
 
     def __init__(self, worlds: int = 1, *, reward="sparse", frame_skip=20, **settings):
         super().__init__(worlds, reward=reward, frame_skip=frame_skip, **settings)
 
     def shortfall(self, achieved, desired):
-        """Largest of three quotients by their tolerances: miss of the goal, difference of speed, difference of spin."""
+        """Largest of three ratios of an error to its tolerance: error of the goal, of the speed, and of the spin."""
         speed, spin = (np.abs(achieved[..., k] - desired[..., k]) for k in (-2, -1))
         miss = self.miss(achieved[..., :-2], desired[..., :-2])
         return np.maximum(miss, np.maximum(speed / REST_SPEED, spin / REST_SPIN))
 
     def miss(self, achieved, desired) -> np.ndarray:
-        """Distance or angle (...,) between goals over its tolerance."""
+        """Error of the achieved goal over its tolerance, shape (...,); the error is a distance or an angle.
+
+        `achieved` and `desired` are goals (..., numbers) without their last two numbers, speed and spin.
+        """
         raise NotImplementedError
 
 
@@ -57,8 +60,8 @@ class BlockReachGoal(BlockGoal):
     """Bring a block to a place on the floor, and keep it at rest there: a task with goals.
 
     The block, the box and the actions are those of `rigid_env.BlockReachEnv`, at 100 ms for a control step. An
-    observation is a dict. A goal is x and z of the block's centre [5 m], its speed [m/s] and its spin [rad/s]; the one
-    that is wanted has speed and spin 0. It is reached within 0.3 m, 0.1 m/s and 0.1 rad/s.
+    observation is a dict. A goal has four numbers: x and z of the block's centre [5 m], its speed [m/s] and its spin
+    [rad/s]. The desired goal has speed and spin 0. It is reached within 0.3 m, 0.1 m/s and 0.1 rad/s.
     """
 
     max_episode_steps = 75
@@ -67,15 +70,15 @@ class BlockReachGoal(BlockGoal):
     goal_draw = "goal"
 
     def goal(self):
-        """Places on the floor."""
+        """Distribution of the desired place: uniform over the floor."""
         return OnFloor(self.area)
 
     def desired(self, worlds):
-        """Drawn place, at rest."""
+        """Desired goals (n, 4): the drawn place [m], speed 0 and spin 0."""
         return np.pad(worlds.drawn["goal"], ((0, 0), (0, 2)))
 
     def miss(self, achieved, desired):
-        """Distance over its tolerance."""
+        """Distance between the achieved and the desired place over its tolerance."""
         return LENGTH * np.linalg.norm(achieved - desired, axis=-1) / REACH_TOLERANCE
 
     def goal_mark(self, world):
@@ -88,9 +91,9 @@ class BlockReorientGoal(BlockGoal):
     """Turn a block so that a face is down, and keep it at rest: a task with goals.
 
     The block, the box and the actions are those of `rigid_env.BlockReorientEnv`, at 100 ms for a control step. An
-    observation is a dict. A goal is the direction straight down, as the block sees it (three numbers), speed [m/s] and
-    spin [rad/s]; of the one that is wanted the direction is the outward normal of a face, and speed and spin are 0. It
-    is reached within 0.1 rad, 0.1 m/s and 0.1 rad/s.
+    observation is a dict. A goal has five numbers: the direction straight down in the body frame (x, y, z), speed [m/s]
+    and spin [rad/s]. In the desired goal the direction is the outward normal of a face, and speed and spin are 0. It is
+    reached within 0.1 rad, 0.1 m/s and 0.1 rad/s.
     """
 
     max_episode_steps = 75
@@ -102,19 +105,19 @@ class BlockReorientGoal(BlockGoal):
     goal_draw = "target_face"
 
     def goal(self):
-        """Any face other than the lower one."""
+        """Distribution of the desired face: any face that is not on the floor at the start."""
         return OtherFace()
 
     def desired(self, worlds):
-        """Outward normal of the drawn face, body frame, at rest."""
+        """Desired goals (n, 5): outward normal of the drawn face in the body frame, speed 0 and spin 0."""
         faces = worlds.drawn["target_face"].astype(np.int64)
         wanted = np.zeros((len(worlds), 5))
         wanted[np.arange(len(worlds)), faces // 2] = np.where(faces % 2 == 1, 1.0, -1.0)
         return wanted
 
     def miss(self, achieved, desired):
-        """Angle over its tolerance."""
-        # Of unit vectors up to float32: the angle from the chord keeps its digits where it is small.
+        """Angle between the achieved and the desired direction over its tolerance."""
+        # Unit vectors, rounded to float32: a small angle keeps its digits if it is computed from the chord.
         chord = np.linalg.norm(achieved - desired, axis=-1)
         return 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0)) / REORIENT_TOLERANCE
 

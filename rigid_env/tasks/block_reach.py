@@ -9,11 +9,11 @@ from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.block_draws import OnFloor
 
 MARK_RADIUS = 1.0
-"""[m] Radius of the goal's disc, large enough to show beside a block that covers its tolerance."""
+"""[m] Radius of the disc that marks the goal in pictures; the tolerance itself would be hidden under the block."""
 
 
 class BlockReach(BlockTask):
-    """The batch behind `rigid_env.envs.block_reach.BlockReachEnv`, which documents it."""
+    """Task of `rigid_env.envs.block_reach.BlockReachEnv`, whose docstring describes it, in a batch of worlds."""
 
     observation = (
         *entries.GOAL_OFFSET,
@@ -28,7 +28,7 @@ class BlockReach(BlockTask):
     compiled = staticmethod(kernels.observe_reach)
 
     def goal(self):
-        """Places on the floor."""
+        """Distribution of the goal: a place, uniform over the floor."""
         return OnFloor(self.area)
 
     def note_episodes(self, rows, values):

@@ -10,7 +10,7 @@ from rigid_env.tasks.block_draws import OtherFace
 
 
 class BlockReorient(BlockTask):
-    """The batch behind `rigid_env.envs.block_reorient.BlockReorientEnv`, which documents it."""
+    """Task of `rigid_env.envs.block_reorient.BlockReorientEnv`, whose docstring describes it, in a batch of worlds."""
 
     observation = (
         *entries.GOAL_AXES,
@@ -24,7 +24,7 @@ class BlockReorient(BlockTask):
     compiled = staticmethod(kernels.observe_reorient)
 
     def goal(self):
-        """Any face other than the lower one."""
+        """Distribution of the target face: any face that is not on the floor at the start."""
         return OtherFace()
 
     def note_episodes(self, rows, values):

@@ -1,7 +1,7 @@
-"""Names for compiled tasks: `kernel`, and the columns of the arrays that it gets.
+"""Names to import for a compiled task: decorators of kernels, and columns of the arrays that its kernel gets.
 
-``Task.compiled`` is a kernel that takes ``(taken, state, record, walls, actions, obs, outcome)``; docs/tasks.md has the
-arrays and a whole task.
+``Task.compiled`` is a kernel that takes ``(taken, state, record, walls, actions, obs, outcome)``. docs/tasks.md
+explains these arrays and shows a whole task.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Declaration of a task by a subclass of `Task`: attributes, and NumPy functions of `Worlds`."""
+"""Interface that a subclass of `Task` fills in: attributes, and NumPy functions of `Worlds`."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from rigid_env.tasks.worlds import Worlds
 
 
 class Declaration:
-    """Attributes and functions of a task; `Task` documents the attributes.
+    """Attributes and functions of a task, with defaults; `Task` documents the attributes not listed here.
 
-    All functions see arrays with one row for each world, and are called once in a control step: `measure`, `update`,
-    `success`, `failure`, `rewards`, then the entries of the observation. At the start of episodes it is `place`,
-    `measure`, `begin` and the entries, with the worlds in which they begin.
+    All functions get arrays with one row for each world. In each control step they are called once, in this order:
+    `measure`, `update`, `success`, `failure`, `rewards`, then `read` of the observation's entries. At the start of
+    episodes the order is `place`, `measure`, `begin`, then `read` of the entries; the arrays then have rows only for
+    the worlds in which an episode begins.
 
     Attributes
     ----------
     compiled : callable or None
-        A kernel in place of the functions `update` to `measure` and of the entries' `read`, for speed:
-        ``(taken, state, record, walls, actions, obs, outcome)``, decorated with `rigid_env.compiled.kernel`. It
-        runs in the threads that step the worlds.
+        A kernel that replaces `measure`, `update`, `success`, `failure`, `rewards` and `read` of the entries, for
+        speed. It takes ``(taken, state, record, walls, actions, obs, outcome)``, is decorated with
+        `rigid_env.compiled.kernel`, and runs in the threads that step the worlds. None: the NumPy functions run.
     measures, terms : tuple of str
-        Of a compiled task: the names of what it writes into `outcome` behind reward, success and failure.
+        Only for a compiled task: names of the numbers, and of the terms of the reward, that the kernel writes into
+        `outcome` after reward, success and failure.
     record_size : int
-        Of a compiled task: numbers per world in `record`, which is its memory; `note_episodes` writes draws into it.
+        Only for a compiled task: length of each world's row in `record`, the kernel's memory. `note_episodes` writes
+        drawn values into it.
     """
 
     scene: ClassVar[physics.Scene]
@@ -48,64 +51,65 @@ class Declaration:
     record_size: ClassVar[int] = 0
 
     def declared_draws(self) -> Mapping[str, Any]:
-        """Distributions of the task by name: `draws`, or distributions from the task's arguments."""
+        """Distributions that each episode draws from, by name: `draws`, or those made from constructor arguments."""
         return self.draws
 
     def make_scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
-        """Scene of all worlds: `scene`, or one made from the task's arguments."""
+        """Scene of all worlds: `scene`, or one made from constructor arguments and the task's `distributions`."""
         return self.scene
 
     def place(self, drawn: Mapping[str, np.ndarray]) -> Mapping[str, Any]:
-        """Return the starting poses of bodies.
+        """Return the starting poses and velocities of the bodies.
 
         Parameters
         ----------
         drawn : dict of str to (n,) or (n, k) float64
-            Values of the n episodes that begin.
+            Drawn values of the n episodes that begin, by the names of `draws`.
 
         Returns
         -------
         dict
-            Of ``pos``, ``quat``, ``linvel`` and ``angvel``, (n, bodies, 3|4|3|3), of one body also (n, 3|4|3|3), or one
-            for all. Arrays that are left out are the scene's.
+            Arrays ``pos``, ``quat``, ``linvel`` and ``angvel`` of shape (n, bodies, 3|4|3|3). A scene with one body may
+            leave out the axis of bodies; an array without the axis of episodes holds for all. The scene's values
+            replace missing arrays.
         """
         return {}
 
     def begin(self, worlds: Worlds) -> None:
-        """Prepare `memory` for episodes that begin; it is zero before."""
+        """Set the starting values of `worlds.memory`, which holds zeros, for the episodes that begin."""
 
     def note_episodes(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
-        """Write draws into `record`, where a compiled function finds them; NumPy functions do not need it.
+        """Write drawn values into `record`, where a compiled task's kernel finds them; NumPy functions do not need it.
 
         Parameters
         ----------
         rows : (n,) int64
-            Worlds in which episodes begin: rows of `record`, which are as the last episode left them.
+            Worlds in which episodes begin. Their rows of `record` still hold the numbers of the last episode.
         values : mapping of str to (n,) or (n, k) float64
-            Values of these episodes, by the names of `draws`.
+            Drawn values of these episodes, by the names of `draws`.
         """
 
     def update(self, worlds: Worlds) -> None:
-        """Change `memory` from the state of the worlds, first in a control step."""
+        """Update `worlds.memory` from the state of the worlds; it is called after `measure` in each control step."""
 
     def success(self, worlds: Worlds) -> np.ndarray:
-        """Worlds (n,) bool that have solved the task, which ends the episode unless `ends_on_success` is False."""
+        """Flags (n,) bool of worlds that have solved the task, which ends the episode if `ends_on_success` is True."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def failure(self, worlds: Worlds) -> np.ndarray:
-        """Worlds (n,) bool that cannot solve the task any more, which ends the episode, too."""
+        """Flags (n,) bool of worlds that can no longer solve the task; an episode ends with it."""
         return np.zeros(len(worlds), dtype=np.bool_)
 
     def rewards(self, worlds: Worlds) -> Mapping[str, np.ndarray]:
-        """Terms of the reward (n,), by name: their sum is the reward, and each is in `info`."""
+        """Terms of the reward, each (n,), by name: their sum is the reward, and `info` holds each of them."""
         return {}
 
     def measure(self, worlds: Worlds) -> Mapping[str, np.ndarray]:
-        """Numbers (n,) by name for `info`, and for the functions below as `worlds.measured`."""
+        """Numbers (n,) by name: `info` holds them, and other functions of the task read them as `worlds.measured`."""
         return {}
 
     def goal_mark(self, world: int) -> Mapping[str, Any] | None:
-        """Return the mark of one world's goal in pictures.
+        """Return the mark that pictures show for the goal of one world.
 
         Parameters
         ----------

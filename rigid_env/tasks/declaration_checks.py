@@ -1,4 +1,4 @@
-"""Check the class of a task for attributes that would be ignored, or would hide the task's own."""
+"""Check a task's class for attributes that nothing would read, or that would overwrite attributes of `Task`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from physics import validation
 
-NEAR = 0.68  # likeness from which on a name is taken for a misspelt one
+NEAR = 0.68  # similarity, from 0 to 1, from which on a name is taken for a misspelling of another
 FUNCTIONS = ("place", "note_episodes", "begin", "update", "success", "failure", "rewards", "measure")
 OVERRIDABLE = {"lines", "place_options", "error_name", "area", "goal_draw", "name", "settings", "goal"}
 OVERRIDABLE |= {"own_arrays", "own_settings"}
@@ -26,14 +26,15 @@ def check_class(task: type, base: type, declaration: type) -> None:
     Parameters
     ----------
     task : type
+        The subclass.
     base, declaration : type
         `Task` and `Declaration`.
 
     Raises
     ------
     TypeError
-        Naming the attribute, and what is allowed: one that is the task's own, one that would be ignored since its name
-        is nearly that of a declared one, or a function that is none.
+        Naming the attribute and what is allowed. Refused are an attribute that `Task` uses itself, a name that is
+        nearly that of a declared attribute (a misspelling), and a function of the task that is not callable.
     """
     declared = {name for name in vars(declaration) if not name.startswith("_")} | {"scene"}
     of_base = {name for each in base.__mro__ for name in vars(each) if not name.startswith("_")}
@@ -54,7 +55,10 @@ def check_class(task: type, base: type, declaration: type) -> None:
 
 
 def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
-    """Raise a ValueError if two numbers of an info would have the same key."""
+    """Raise a ValueError if `info` would have a key twice: the environment's own keys, `names`, keys of `drawn`.
+
+    `task` is the name of the task in the error.
+    """
     keys = [*OF_INFO, *names, *drawn]
     twice = sorted({key for key in keys if keys.count(key) > 1})
     if twice:
@@ -62,7 +66,7 @@ def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
 
 
 def checked_limit(value: Any, field: str) -> int | None:
-    """Control steps of an episode, at least 1; None: no limit."""
+    """Most control steps of an episode: an integer of at least 1, or None for no limit; `field` names it in errors."""
     try:
         return None if value is None else validation.count(value, field)
     except ValueError as error:

@@ -1,6 +1,6 @@
-"""Documentation of any task as Markdown: the tables of an environment's docstring, from the task's declaration.
+"""Write the documentation of any task as Markdown: sections and tables, made from the task's declaration.
 
-`rigid_env.envs.block_reach` is the form: Gymnasium's sections in Gymnasium's order.
+The docstring of `rigid_env.envs.block_reach` is the model: sections with Gymnasium's titles, in Gymnasium's order.
 """
 
 from __future__ import annotations
@@ -22,24 +22,25 @@ from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meanin
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.written import Part, sentences, written_parts
 
-WIDTH = 79  # of lines of text [characters]
+WIDTH = 79  # largest length of a line of text [characters]
 
 REACH = "longest half extent, of a hull the farthest along a body axis from the centre of mass"
-"""Meaning of the unit of torques over the weight."""
+"""Explanation of a body's reach, the length in the unit of torques."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the documentation.
+    """A section of a task's documentation: a title, paragraphs and one table.
 
     Attributes
     ----------
     title : str
     before, after : tuple of str
-        Paragraphs around the table.
+        Paragraphs before and after the table.
     columns : tuple of str
-        Of the table; empty without one.
+        Titles of the table's columns; empty if there is no table.
     rows : tuple of tuple of str
+        Cells of the table, row by row.
     """
 
     title: str
@@ -50,7 +51,7 @@ class Section:
 
     @property
     def markdown(self) -> str:
-        """The section in Markdown: heading, text and table."""
+        """Section in Markdown: heading, paragraphs and table."""
         parts = [f"## {self.title}", *map(_wrapped, self.before)]
         if self.rows:
             lines = (self.columns, ("---",) * len(self.columns), *self.rows)
@@ -60,17 +61,20 @@ class Section:
         return "\n\n".join([*parts, *map(_wrapped, self.after)])
 
     def to_dict(self) -> dict[str, Any]:
-        """Section ready for JSON."""
+        """Section as a dict for JSON, with the keys title, text, columns and rows."""
         return {"title": self.title, "text": [*self.before, *self.after], "columns": self.columns, "rows": self.rows}
 
 
 def describe(task: Task) -> str:
-    """Documentation of a task as Markdown; `RigidEnv.describe` gives that of an environment."""
+    """Documentation of a task as Markdown.
+
+    For an environment, `RigidEnv.describe` also documents the environment's arguments.
+    """
     return markdown(sections(task))
 
 
 def markdown(found: Iterable[Section]) -> str:
-    """Sections as one text."""
+    """Markdown of several sections, one below the other."""
     return "\n\n".join(section.markdown for section in found) + "\n"
 
 
@@ -80,18 +84,18 @@ def sections(
     added: Mapping[str, Any] | None = None,
     registered: Mapping[str, Any] | None = None,
 ) -> tuple[Section, ...]:
-    """Documentation of a task, section by section.
+    """Sections of a task's documentation, in Gymnasium's order.
 
     Parameters
     ----------
     task : Task
     documented : type, optional
-        Class whose docstring describes the task; None: that of the task. Where it has the sections of Gymnasium, their
-        words stand around the tables, and their meanings of arguments in the last one.
+        Class whose docstring describes the task; None: the task's class. If this docstring has sections with
+        Gymnasium's titles, their paragraphs replace generated ones, and their meanings of arguments are used.
     added : mapping, optional
-        Arguments that the environment adds to the task's, with their defaults.
+        Arguments that an environment adds to those of the task, with their defaults.
     registered : mapping, optional
-        Defaults of the id that the environment is registered under, instead of its class's.
+        Defaults that the environment is registered with in Gymnasium; they replace those of the class.
     """
     found = (
         _description(task, documented or type(task)),
@@ -229,11 +233,11 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
     return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
 
 
-# --- with the words of a docstring ------------------------------------------------------------------------------------
+# --- sections that a docstring contains -------------------------------------------------------------------------------
 
 
 def _merged(section: Section, part: Part) -> Section:
-    """Section with the text that a docstring has under its title; numbers of its own tables and limits stay."""
+    """Generated section with the paragraphs that a docstring has in `part`; generated tables and time limits stay."""
     title = section.title
     if title == "Description":
         return replace(section, before=(*section.before, *part.text))
@@ -246,24 +250,24 @@ def _merged(section: Section, part: Part) -> Section:
         return replace(section, before=(*words, *section.before[1:]))
     if title == "Arguments":
         meanings = {row[0]: row[-1] for row in part.rows}
-        meanings.setdefault("`threads`", ARGUMENTS["threads"])  # of batches
+        meanings.setdefault("`threads`", ARGUMENTS["threads"])  # an argument of batches alone
         rows = tuple((*row[:-1], meanings[row[0]]) for row in section.rows if row[0] in meanings)
         rows = rows if part.rows else section.rows
         return replace(section, rows=rows, before=part.before, after=part.after)
     return replace(section, before=part.text)
 
 
-# --- parts of these ---------------------------------------------------------------------------------------------------
+# --- parts of sections ------------------------------------------------------------------------------------------------
 
 
 def _kind(index: int, body: Body) -> str:
-    """Index, name and class of a body."""
+    """Label of a body in the list of bodies: its index, its name if it has one, and its class."""
     kind = type(body).__name__
     return f"{index} {kind}" if body.name is None else f"{index} {body.name} ({kind})"
 
 
 def _named(section: Section, names: tuple[str, ...]) -> Section:
-    """Section with the names of bodies behind their indices."""
+    """Section whose table has the names of bodies after their indices, such as "body 1 (ball)"."""
 
     def label(found: re.Match) -> str:
         return f"body {body_label(int(found[1]), names)}"
@@ -279,14 +283,14 @@ def _default(value: Any) -> str:
 
 
 def _own_text(task: Task, name: str) -> tuple[str, ...]:
-    """First paragraph of the docstring of a function that the task defines itself."""
+    """First paragraph of the docstring of the task's own function `name`, in a tuple; empty if there is none."""
     function = getattr(type(task), name)
     doc = function.__doc__ if function is not getattr(Declaration, name) else None
     return tuple(_paragraphs(inspect.cleandoc(doc))[:1]) if doc else ()
 
 
 def _paragraphs(doc: str) -> list[str]:
-    """Paragraphs of a docstring before its first heading."""
+    """Paragraphs of a docstring before its first heading, each as one line."""
     head = re.split(r"^(?:## .*|\w+\n-+)$", doc, maxsplit=1, flags=re.MULTILINE)[0]
     return [" ".join(part.split()) for part in head.split("\n\n") if part.strip()]
 

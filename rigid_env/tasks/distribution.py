@@ -1,7 +1,8 @@
-"""Base of distributions for the start of an episode; each turns uniform numbers into values.
+"""Base class of distributions that an episode draws from; each turns uniform numbers into values.
 
-A distribution takes a fixed number of uniform numbers, whatever the values are. An episode draws them all at once from
-the generator of its world, so that fixing one value, or replacing one distribution, leaves the others of a seed alone.
+A distribution takes a fixed number of uniform numbers for one value. An episode first draws the uniform numbers of all
+distributions from the random generator of its world. So with the same seed, a fixed value or a replaced distribution
+does not change the values of the other distributions, if it takes as many uniform numbers.
 """
 
 from __future__ import annotations
@@ -13,19 +14,19 @@ from collections.abc import Mapping
 import numpy as np
 
 LAST = float(np.nextafter(1.0, 0.0))
-"""Largest uniform number."""
+"""Largest number below 1: the upper end of uniform numbers."""
 
 Drawn = Mapping[str, np.ndarray]
-"""Type of values drawn before, by name: (n,) or (n, k) float64."""
+"""Type of the values that an episode has drawn already, by name: (n,) or (n, k) float64."""
 
 
 class Distribution(ABC):
-    """Distribution of one named value over new episodes.
+    """Distribution that new episodes draw one named value from.
 
     Attributes
     ----------
     length : int
-        Numbers in one value: 1 for (n,) arrays, else (n, length).
+        Length k of one value: values are (n,) arrays for 1, else (n, k).
     uniforms : int
         Uniform numbers that one value takes.
     """
@@ -40,9 +41,10 @@ class Distribution(ABC):
         Parameters
         ----------
         shares : (n, uniforms) float64
-            In [0, 1).
+            Uniform numbers in [0, 1), a row for each value.
         drawn : mapping of str to array
-            Values that stand before this one in the task's `draws`; physical parameters stand before all others.
+            Values of the same episodes that are drawn earlier: physical parameters first, the rest in the order of the
+            task's `draws`.
 
         Returns
         -------
@@ -51,27 +53,28 @@ class Distribution(ABC):
 
     @abstractmethod
     def describe(self) -> str:
-        """Text for a table, such as ``uniform from 0 to 1``."""
+        """Description of the distribution for a table, such as ``uniform from 0 to 1``."""
 
     @property
     def is_fixed(self) -> bool:
-        """True if the value is fixed."""
+        """True if all episodes get the same value."""
         return False
 
     def ends(self) -> np.ndarray:
-        """Values (2,) or (2, length) at the least and the largest uniform numbers."""
+        """Values (2,) or (2, length) of the distribution where all uniform numbers are 0, and where all are `LAST`."""
         return np.stack([self.at(np.full((1, self.uniforms), share), {})[0] for share in (0.0, LAST)])
 
     def read(self, field: str, value, worlds: int) -> np.ndarray:
-        """Check a user's value that takes the place of a draw.
+        """Check a value that a user gives instead of a draw.
 
         Parameters
         ----------
         field : str
-            Name in an error.
+            Name of the value in an error.
         value : array_like
             One value for all worlds, or one for each.
         worlds : int
+            Number of worlds.
 
         Returns
         -------
@@ -80,13 +83,16 @@ class Distribution(ABC):
         Raises
         ------
         ValueError
-            Naming the field, the value and what is allowed.
+            The message names the field, its value and what is allowed.
         """
         return read_numbers(field, value, worlds, self.length)
 
 
 def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
-    """Finite numbers (worlds,) or (worlds, length), from one value for all worlds or one for each."""
+    """Check that a user's value has finite numbers, and repeat it for each world: (worlds,) or (worlds, length).
+
+    `value` has `length` numbers for all worlds, or as many for each; a ValueError names `field`.
+    """
     shape = (worlds,) if length == 1 else (worlds, length)
     try:
         array = np.asarray(value)
@@ -103,6 +109,6 @@ def read_numbers(field: str, value, worlds: int, length: int) -> np.ndarray:
 
 
 def is_of_user(distribution: Distribution) -> bool:
-    """True if a user's code draws, in the distribution or in one that it holds."""
+    """True if the distribution, or one that it contains, has a class from outside `rigid_env`, whose code may fail."""
     parts = (distribution, *(part for part in vars(distribution).values() if isinstance(part, Distribution)))
     return any(not str(type(part).__module__).startswith("rigid_env.") for part in parts)

@@ -1,4 +1,4 @@
-"""Distributions that a task can draw from: uniform, log-uniform, normal, a choice; `distribution` has their base."""
+"""Distributions that a task can draw from: uniform, log-uniform, normal, and a choice of values."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ DEVIATIONS = 5.0
 
 
 class _Elementwise(Distribution):
-    """A distribution with one uniform number for each number of a value."""
+    """Base of distributions whose values have independent elements: each element takes one uniform number."""
 
     def _set(self, name: str, **ends) -> None:
-        """Keep parameters as arrays of one shape: () or (k,)."""
+        """Check parameters given by name, and keep each as an attribute: arrays of one shape, () or (k,)."""
         arrays = {}
         for field, value in ends.items():
             try:
@@ -40,7 +40,7 @@ class _Elementwise(Distribution):
 
     @property
     def is_scalar(self) -> bool:
-        """True if a value is a single number, not a row."""
+        """True if a value is a single number instead of a row."""
         return self._first.ndim == 0
 
     @property
@@ -49,17 +49,17 @@ class _Elementwise(Distribution):
 
 
 class Uniform(_Elementwise):
-    """Numbers between two ends, each as likely as the other.
+    """Numbers from `low` to `high`, each with the same probability.
 
     Parameters
     ----------
     low, high : number or (k,) numbers
-        k numbers make a value a row of k, drawn independently.
+        Ends. With k numbers, a value is a row of k numbers that are drawn independently.
 
     Raises
     ------
     ValueError
-        Ends that are not finite, of different lengths, or the wrong way round.
+        Ends that are not finite or of different lengths, or `low` above `high`.
     """
 
     low: NDArray[np.float64]
@@ -85,17 +85,17 @@ class Uniform(_Elementwise):
 
 
 class LogUniform(_Elementwise):
-    """Numbers between two positive ends whose logarithm is uniform.
+    """Positive numbers from `low` to `high` whose logarithm is uniform.
 
     Parameters
     ----------
     low, high : number or (k,) numbers
-        Above 0.
+        Ends, above 0. With k numbers, a value is a row of k numbers that are drawn independently.
 
     Raises
     ------
     ValueError
-        Ends that are not finite and positive, of different lengths, or the wrong way round.
+        Ends that are not finite, not positive or of different lengths, or `low` above `high`.
     """
 
     low: NDArray[np.float64]
@@ -121,20 +121,23 @@ class LogUniform(_Elementwise):
 
 
 class Normal(_Elementwise):
-    """Normal numbers, cut off at two ends: drawn by the inverse of the distribution between them.
+    """Numbers of a normal distribution that is cut off at two ends.
+
+    A value is drawn by the inverse of the cumulative distribution between the ends.
 
     Parameters
     ----------
     mean : number or (k,) numbers
+        Mean before the cut.
     deviation : number or (k,) numbers
         Standard deviation before the cut, above 0.
     low, high : number or (k,) numbers, optional
-        Ends; by default five deviations from the mean, since a uniform number of 0 has no finite value otherwise.
+        Ends; by default five deviations from the mean, so that the value for each uniform number is finite.
 
     Raises
     ------
     ValueError
-        Numbers that are not finite, a deviation that is not positive, or ends the wrong way round.
+        Numbers that are not finite, a deviation that is not positive, or `low` not below `high`.
     """
 
     mean: NDArray[np.float64]
@@ -151,7 +154,7 @@ class Normal(_Elementwise):
             raise ValueError(f"deviation of Normal is {deviation!r}; allowed are numbers above 0")
         if not (self.low < self.high).all():
             raise ValueError(f"Normal has low {low!r} and high {high!r}; allowed is low below high")
-        from scipy.special import ndtr  # half a second, for those who draw from one
+        from scipy.special import ndtr  # this import takes half a second, so only normal distributions pay for it
 
         self._ends = tuple(ndtr((end - self.mean) / self.deviation) for end in (self.low, self.high))
 
@@ -173,7 +176,7 @@ class Normal(_Elementwise):
 
 
 class Choice(Distribution):
-    """One of several values, each as likely as the other.
+    """One of several values, each with the same probability.
 
     Parameters
     ----------
@@ -219,7 +222,7 @@ class Choice(Distribution):
 
 
 def is_elementwise(distribution: Distribution) -> bool:
-    """True if a value's numbers are drawn independently, so that two of them are hardly ever equal."""
+    """True if the elements of a value are drawn independently, so that two elements are hardly ever equal."""
     return isinstance(distribution, _Elementwise) and not distribution.is_fixed
 
 
@@ -229,16 +232,16 @@ def as_distribution(field: str, value, length: int | None = None) -> Distributio
     Parameters
     ----------
     field : str
-        Name in an error.
+        Name of the value in an error.
     value : Distribution, number, row of numbers, or a pair (low, high) of either
         A pair is a uniform range. A row of two numbers means a pair, unless `length` is 2.
     length : int, optional
-        Numbers in one value, where it is known.
+        Required length of one value; None: any.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
     if isinstance(value, Distribution):
         if length is not None and value.length != length:

@@ -1,8 +1,8 @@
 """Disturbances: pushes and gusts at random times, which the agent does not choose.
 
-They begin and end with control steps. One begins in each quiet control step with the same probability, so that the time
-since the last one tells nothing about the next. No actuator stands between a disturbance and its body. All random
-numbers come from the generator of the world that is disturbed.
+Disturbances begin and end together with control steps. In each control step without one, a disturbance begins with the
+same probability, so the time since the last one says nothing about the next. A disturbance acts on its body directly,
+not through an actuator of the scene. Its random numbers come from the generator of its world.
 """
 
 from __future__ import annotations
@@ -20,28 +20,30 @@ from rigid_env.tasks.distributions import as_distribution
 from rigid_env.tasks.task_parts import Disturbed
 
 UNIFORMS = 5  # of one disturbance: direction (2), size (1), duration (1), wait (1)
-FAR = 2**53  # control steps after which nobody looks: larger numbers are cut
-NEVER = np.iinfo(np.int64).max  # control step of a disturbance before its episode has begun
+FAR = 2**53  # largest wait or duration in control steps; no episode is as long
+NEVER = np.iinfo(np.int64).max  # start of the next disturbance, in control steps, before the first episode
 
 
 @dataclass(frozen=True)
 class Push:
-    """An impulse at the centre of mass, at random times.
+    """A sudden change of a body's velocity at random times, by an impulse at the centre of mass.
 
     Parameters
     ----------
     body : int
+        Index of the body.
     speed : number, pair or Distribution
         Change of the body's speed [m/s].
     every : float
-        Mean time between two [s]; a control step has at most one.
+        Mean time between two pushes [s]; a control step has at most one.
     axes : str
-        Axes that span the directions, each as likely as the other: ``xz`` is horizontal.
+        Axes that span the possible directions, letters of "xyz"; each direction has the same probability. ``xz`` means
+        all horizontal directions.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -58,24 +60,25 @@ class Push:
 
 @dataclass(frozen=True)
 class Gust:
-    """A force at the centre of mass that lasts for a while, at random times.
+    """A constant force at a body's centre of mass that lasts for a while, at random times.
 
     Parameters
     ----------
     body : int
+        Index of the body.
     force : number, pair or Distribution
         Force over the body's weight.
     lasts : number, pair or Distribution
-        Duration [s], to the nearest number of control steps, at least one.
+        Duration [s], rounded to a whole number of control steps, at least one.
     every : float
-        Mean time from the end of one to the start of the next [s].
+        Mean time from the end of one gust to the start of the next [s].
     axes : str
-        As of `Push`.
+        Axes that span the possible directions, as in `Push`.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     body: int = 0
@@ -93,7 +96,7 @@ class Gust:
 
 
 def _take_size(kind: Push | Gust, field: str) -> None:
-    """Replace a field by a distribution of non-negative numbers."""
+    """Replace the value in a field of a disturbance by a distribution; refuse one with negative numbers."""
     value = getattr(kind, field)
     sizes = as_distribution(field, value, 1)
     if (sizes.ends() < 0.0).any():
@@ -102,7 +105,7 @@ def _take_size(kind: Push | Gust, field: str) -> None:
 
 
 def direction(shares: np.ndarray, axes: str) -> np.ndarray:
-    """Random unit vector (3,) from two uniform numbers, uniform over directions along the `axes`."""
+    """Unit vector (3,), uniform over directions in the span of `axes` (letters of "xyz"), from uniform numbers (2,)."""
     vector = np.zeros(3)
     places = ["xyz".index(axis) for axis in axes]
     if len(places) == 1:
@@ -110,7 +113,7 @@ def direction(shares: np.ndarray, axes: str) -> np.ndarray:
     elif len(places) == 2:
         turn = 2.0 * math.pi * shares[0]
         vector[places] = math.cos(turn), math.sin(turn)
-    else:  # Archimedes: the height of a uniform point of a sphere is uniform
+    else:  # Archimedes: a uniform point on a sphere has a uniform height
         height, turn = 2.0 * shares[1] - 1.0, 2.0 * math.pi * shares[0]
         radius = math.sqrt(max(0.0, 1.0 - height * height))
         vector[:] = radius * math.cos(turn), radius * math.sin(turn), height
@@ -118,12 +121,15 @@ def direction(shares: np.ndarray, axes: str) -> np.ndarray:
 
 
 def quiet_steps(mean: float, share: float) -> int:
-    """Number of control steps before a disturbance that starts in each step with the probability 1 / (1 + `mean`).
+    """Draw the number of control steps before the next disturbance.
+
+    The disturbance starts in each step with the probability 1 / (1 + `mean`), so the number has a geometric
+    distribution.
 
     Parameters
     ----------
     mean : float
-        Of the number; none are below 0.
+        Mean of the number; 0 or below gives 0.
     share : float
         Uniform random number, at least 0 and below 1.
     """
@@ -131,28 +137,30 @@ def quiet_steps(mean: float, share: float) -> int:
 
 
 class Disturbances:
-    """All disturbances of a batch, and the times of the next ones.
+    """Disturbances of all worlds of a batch: the current ones, and the start times of the next ones.
 
     Parameters
     ----------
     kinds : sequence of Push and Gust
+        Disturbances that the task declares.
     task : Disturbed
+        The task, which has the worlds, their random generators and the bodies' weights.
 
     Attributes
     ----------
     next : (kinds, worlds) int64
-        Control step of the episode in which the next one starts.
+        Control step of the episode in which the next disturbance starts.
     end : (kinds, worlds) int64
-        Control step before which the present one ends.
+        First control step of the episode in which the current disturbance no longer acts.
     force : (kinds, worlds, 3) float64
-        Of the present one [N].
+        Force of the current disturbance, world frame [N].
     load : (worlds, bodies, 6) float64
-        Of all gusts in the last control step: force [N], torque [N m], world frame.
+        Sum of all gusts in the last control step: force [N], torque [N m], world frame.
 
     Raises
     ------
     ValueError
-        Something that is no disturbance, or a body that is not there.
+        An object that is no disturbance, or a body that is not in the scene.
     """
 
     def __init__(self, kinds, task: Disturbed):
@@ -169,14 +177,17 @@ class Disturbances:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Arrays that decide the coming disturbances, without the random generators: views with the worlds first."""
+        """Arrays that decide the coming disturbances, by name, as views whose first axis is the world.
+
+        The random generators, which decide them too, are not included.
+        """
         return {
             "disturbance start": self.next.swapaxes(0, 1), "disturbance end": self.end.swapaxes(0, 1),
             "disturbance force": self.force.swapaxes(0, 1), "disturbance load": self.load,
         }  # fmt: skip
 
     def begin(self, rows: np.ndarray) -> None:
-        """Draw the first disturbances of episodes that begin in worlds `rows`."""
+        """Draw when the first disturbances start, for the episodes that begin in worlds `rows` (n,)."""
         self.load[rows] = 0.0
         for k, kind in enumerate(self.kinds):
             self.force[k, rows] = self.end[k, rows] = 0
@@ -184,10 +195,10 @@ class Disturbances:
             self.next[k, rows] = [quiet_steps(quiet, self._task.generators[world].random()) for world in rows]
 
     def wait_anew(self) -> None:
-        """Draw the starts of the next disturbances anew, for a model that must not know them.
+        """Draw again when the next disturbances start, in all worlds.
 
-        A disturbance starts in each quiet step with the same probability, so waits that go on from now have the same
-        distribution.
+        A planner's model calls it, so that it does not know the future of the real worlds. A disturbance starts in each
+        quiet step with the same probability, so a wait that is drawn from now on has the right distribution.
         """
         for k, kind in enumerate(self.kinds):
             quiet = self._quiet(kind)
@@ -195,7 +206,7 @@ class Disturbances:
             self.next[k] = np.maximum(self._task.steps, self.end[k]) + waits
 
     def _quiet(self, kind: Any) -> float:
-        """Mean number of quiet control steps between the end of a disturbance and the start of the next."""
+        """Mean number of control steps between the end of a disturbance of this kind and the start of the next."""
         return kind.every / self._task.control_dt - (1.0 if isinstance(kind, Push) else 0.0)
 
     def due(self) -> np.ndarray:
@@ -203,7 +214,15 @@ class Disturbances:
         return np.flatnonzero((self.next <= self._task.steps).any(axis=0))
 
     def act(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """Load (worlds, bodies, 6) of the coming control step, and the extra load of its first physics step, if any."""
+        """Start the disturbances that are due, and return the loads of the coming control step.
+
+        Returns
+        -------
+        load : (worlds, bodies, 6) float64
+            Gusts of the whole control step: force [N], torque [N m], world frame.
+        push : (worlds, bodies, 6) float64 or None
+            Pushes, which act in the first physics step only; None if the task declares no `Push`.
+        """
         steps, push = self._task.steps, self._push
         self.load.fill(0.0)
         if push is not None:
@@ -220,7 +239,10 @@ class Disturbances:
         return self.load, push
 
     def _draw(self, k: int, kind: Any, world: int, step: int) -> None:
-        """Draw a disturbance that starts in a control step, and the start of the next one."""
+        """Start a disturbance in control step `step` of a world: draw its force, its end and the next start.
+
+        `k` is the index of its `kind` among the task's disturbances.
+        """
         task = self._task
         shares = task.generators[world].random(UNIFORMS)
         along = direction(shares[:2], kind.axes)

@@ -1,4 +1,4 @@
-"""Values of episodes: drawn at their start, fixed by an option, or held at a given value."""
+"""Drawn values of episodes: drawn at the start, fixed by an option of `reset`, or held at a value by the user."""
 
 from __future__ import annotations
 
@@ -15,45 +15,50 @@ from rigid_env.tasks.distributions import is_elementwise
 from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
 
 SEED = 0
-"""Seed of values before the first episode; any fixed number serves."""
+"""Seed of the uniform numbers for values before the first episode; any fixed number serves."""
 
 NEAR = 0.8
-"""Least likeness at which a name counts as a misspelling of another."""
+"""Smallest similarity, from 0 to 1, at which a name counts as a misspelling of another."""
 
 DOWN = (0.0, -1.0, 0.0)
-"""Direction of gravity in a world that has never had any."""
+"""Direction of gravity in a world whose gravity is zero."""
 
 _PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[(\d+)\])?$")
 
 
 def parameter_of(name: str) -> tuple[str, int | None] | None:
-    """Physical parameter of a name, and its body (None: all); None for a name of the task's own."""
+    """Split a draw's name such as ``mass[1]`` into a physical parameter and a body.
+
+    Returns ``("mass", 1)``, with None for the body if the name means all bodies, and None alone for a name that is no
+    physical parameter.
+    """
     found = _PARAMETER.match(name)
     return None if found is None else (found[1], None if found[2] is None else int(found[2]))
 
 
 class Draws:
-    """Values by name, in every world of a batch.
+    """Drawn values of the running episodes, by name, for every world of a batch.
 
     Parameters
     ----------
     distributions : mapping of str to Distribution
-        The names ``mass``, ``size``, ``radius`` (of spheres), ``friction``, ``restitution`` and ``gravity`` mean
-        physical parameters of all bodies, ``mass[1]`` that of body 1 alone.
+        Distribution of each value. The names ``mass``, ``size``, ``radius`` (of spheres), ``friction``, ``restitution``
+        and ``gravity`` mean physical parameters of all bodies, ``mass[1]`` that of body 1 alone.
     worlds : int
+        Number of worlds.
 
     Attributes
     ----------
     now : dict of str to (worlds,) or (worlds, k) float64
-        Of the running episodes; before the first, values at the middle of each distribution, and drawn ones of a user's
-        distribution, which need not have a value there.
+        Values of the running episodes. Before the first episode each value is the middle of its distribution; a value
+        of a user's distribution, which may have no middle, is drawn with a fixed seed instead.
     uniforms : int
         Uniform numbers that an episode takes.
     held : dict of str to (worlds,) or (worlds, k) float64
-        Values that are held, in place of draws.
+        Values that new episodes take instead of draws, see `hold`.
     varying : set of str
-        Physical parameters that the world is told of at the start of an episode; the others never differ from its
-        scene.
+        Physical parameters that are written into the world at the start of an episode; all others have the scene's
+        values in every episode.
     """
 
     def __init__(self, distributions: Mapping[str, Distribution], worlds: int):
@@ -73,16 +78,16 @@ class Draws:
         self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
 
     def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Draw values of new episodes, without changing the present ones.
+        """Draw the values of new episodes, and return them; the values of the running episodes stay.
 
         Parameters
         ----------
         rows : (n,) int64
-            Worlds.
+            Worlds in which the episodes begin.
         shares : (n, uniforms) float64
-            In [0, 1).
-        options : mapping
-            Of `read_options`: takes the place of what is drawn or held.
+            Uniform numbers in [0, 1), a row for each episode.
+        options : mapping of str to (n,) or (n, k) float64
+            Values that options of `reset` fix; they replace drawn and held ones.
 
         Returns
         -------
@@ -91,7 +96,7 @@ class Draws:
         Raises
         ------
         ValueError
-            A distribution of a user gives what it may not.
+            A user's distribution returns values of a wrong shape or type, or values that are not finite.
         """
         values: dict[str, np.ndarray] = {}
         for name in self._order:
@@ -106,11 +111,11 @@ class Draws:
         return values
 
     def rehearsal(self) -> np.ndarray:
-        """Fixed uniform numbers (1, uniforms) of an episode, for values before the first one."""
+        """Fixed uniform numbers (1, uniforms) of one episode, for values that are needed before the first episode."""
         return np.random.default_rng(SEED).random((1, self.uniforms))
 
     def _check(self, name: str, values, count: int) -> None:
-        """Refuse values of a user's distribution that are not finite numbers of the right shape."""
+        """Raise a ValueError if the `count` values of a user's distribution are not finite or of a wrong shape."""
         length = self.distributions[name].length
         shape = (count,) if length == 1 else (count, length)
         what = f"at of {type(self.distributions[name]).__name__}, draws {name},"
@@ -121,13 +126,22 @@ class Draws:
             raise ValueError(f"{what} gave {values[~np.isfinite(values)][0]}; allowed are finite numbers")
 
     def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
-        """Store the values of new episodes."""
+        """Store the values of episodes that begin in worlds `rows`; `options` has those that options of `reset` fix."""
         for name, value in values.items():
             self.now[name][rows] = value
         self.varying.update(name for name in self.parameters if name in options)
 
     def hold(self, name: str, values: np.ndarray | None) -> None:
-        """Hold a value, (worlds,) or (worlds, k), in later episodes, a parameter from now on; None: draw it again."""
+        """Hold a value for later episodes, without drawing it again.
+
+        Parameters
+        ----------
+        name : str
+            Name of the draw.
+        values : (worlds,) or (worlds, k) float64 or None
+            A physical parameter also replaces the value of the running episodes. None: draw again from the next episode
+            on.
+        """
         if values is None:
             self.held.pop(name, None)
             return
@@ -137,7 +151,10 @@ class Draws:
             self.varying.add(name)
 
     def read(self, name: str, field: str, value, worlds: int) -> np.ndarray:
-        """Check a value given from outside; see `Distribution.read`. `field` is its name in an error."""
+        """Check a user's value for the draw `name`: shape, finite numbers, and the range of a physical parameter.
+
+        `field` is the name of the value in an error.
+        """
         values = self.distributions[name].read(field, value, worlds)
         parameter = parameter_of(name)
         if parameter is not None:
@@ -151,9 +168,14 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
     Parameters
     ----------
     values : mapping of str to (n,) or (n, k) array
-        By names such as ``mass`` and ``mass[1]``.
+        New values in n worlds, by names such as ``mass`` and ``mass[1]``.
     before : mapping of str to (n, bodies) or (n, bodies, 3) array
-        What the bodies have now, by parameter; gravity (n, 3), as a vector [m/s²].
+        Present values of all bodies, by parameter; gravity (n, 3) as a vector [m/s²].
+
+    Returns
+    -------
+    dict of str to (n, bodies), (n, bodies, 3) or (n, 3) array
+        Present values with the new ones written into them.
     """
     arguments: dict[str, np.ndarray] = {}
     for name, value in values.items():
@@ -175,14 +197,16 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
 
 
 def check_draws(task: str, distributions: Mapping[str, Distribution], world: World) -> None:
-    """Refuse physical parameters that the scene cannot use, or that are out of range.
+    """Check the physical parameters among a task's draws: the scene must have them, and their ranges must be allowed.
 
     Parameters
     ----------
     task : str
-        Its name.
-    distributions : mapping
+        Name of the task, for errors.
+    distributions : mapping of str to Distribution
+        Draws of the task, by name.
     world : physics.World
+        World of the task.
 
     Raises
     ------
@@ -220,7 +244,11 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
 
 
 def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: World, name: str) -> None:
-    """Refuse a radius of bodies other than spheres, one beside a size, and a size of three numbers of a sphere."""
+    """Check the draw `name`, a size or radius, against the shapes of the bodies that it means.
+
+    A ValueError refuses a radius for a body that is no sphere, a radius beside a size for the same body, and a size
+    with three independent numbers for a sphere.
+    """
     kind, body = parameter_of(name) or ("", None)
     bodies = world.scene.bodies
     meant = range(len(bodies)) if body is None else (body,)

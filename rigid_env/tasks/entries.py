@@ -12,25 +12,26 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Entry:
-    """One number of an observation, or several that one function reads.
+    """One or several numbers of an observation, which one function reads.
 
     Parameters
     ----------
     name : str or sequence of str
-        Of each number.
+        Name of the number, or of each number.
     unit : str
-        In which it is told, such as ``m/s``.
+        Unit of the numbers, such as ``m/s``.
     low, high : float
-        Bounds, in this unit; the numbers read are clipped to them.
+        Bounds, in units of `scale` times `unit`; numbers outside are clipped to them.
     read : callable, optional
-        From `Worlds` to the numbers, (n,) or (n, numbers). None where a compiled function writes the observation.
+        Function from `Worlds` to the numbers, (n,) or (n, numbers), in `unit`. None: the task has a compiled function
+        that writes the observation.
     scale : float
-        Value of one unit: with 5 and ``m`` an observation is told in units of 5 m.
+        Number that the observation is divided by: with 5 and ``m`` an observation of 1 means 5 m.
 
     Raises
     ------
     ValueError
-        No name, two of one name, bounds the wrong way round or a scale that is not positive.
+        No name, the same name twice, `low` not below `high`, or a scale that is not positive.
     """
 
     name: str | tuple[str, ...]
@@ -62,24 +63,24 @@ class Entry:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of each number."""
+        """Names of the entry's numbers, one for each."""
         return (self.name,) if isinstance(self.name, str) else self.name
 
     @property
     def told_unit(self) -> str:
-        """Unit with its scale, for tables."""
+        """Unit with its scale for tables, such as "5 m"."""
         return self.unit if self.scale == 1.0 else f"{self.scale:g} {self.unit}".removesuffix(" 1")
 
 
 def refuse_twice(names: Sequence[str]) -> None:
-    """Raise a ValueError if a name occurs twice."""
+    """Raise a ValueError if a name occurs twice in `names`."""
     twice = sorted({name for name in names if list(names).count(name) > 1})
     if twice:
         raise ValueError(f"observation has two entries of the name {twice[0]!r}; allowed are different names")
 
 
 class Observation:
-    """All entries of a task, and the order of their numbers.
+    """All entries of a task's observation, in the order of their numbers.
 
     Parameters
     ----------
@@ -88,14 +89,16 @@ class Observation:
     Attributes
     ----------
     size : int
+        Numbers in an observation.
     low, high : (size,) float32
+        Bounds of each number.
     scales : (size,) float64
-        Value of one unit of each number.
+        `Entry.scale` of each number.
 
     Raises
     ------
     ValueError
-        Something that is no entry, or two entries of one name.
+        An object that is no `Entry`, or two entries of one name.
     """
 
     def __init__(self, entries: Sequence[Entry]):
@@ -123,17 +126,18 @@ class Observation:
         self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []
 
     def read(self, worlds, out: np.ndarray) -> np.ndarray:
-        """Read all entries into `out` (n, size) float32, scaled and clipped.
+        """Read the numbers of all entries from `worlds`; write them scaled and clipped into `out` (n, size) float32.
 
         Returns
         -------
         (n, size) float64
-            Numbers as the entries gave them, until the next call: clipping would hide infinite ones.
+            Numbers before scaling and clipping, so that the caller can see infinite ones. The next call overwrites
+            them.
         """
         table, targets = self._targets
         if len(table) != len(out):
             table, targets = self._make_targets(len(out))
-            if len(out) > len(self._targets[0]):  # of all worlds, in every step; of a few at the start of episodes
+            if len(out) > len(self._targets[0]):  # the largest table, which every step needs, is kept
                 self._targets = table, targets
         for entry, columns, column in targets:
             values = entry.read(worlds)
@@ -147,11 +151,15 @@ class Observation:
 
     @property
     def names(self) -> list[str]:
-        """Name of each number."""
+        """Names of the numbers of the whole observation, one for each."""
         return [name for entry in self.entries for name in entry.names]
 
     def _make_targets(self, count: int) -> tuple[np.ndarray, list]:
-        """Table (count, size) for the numbers of entries, and the part of it that each entry writes."""
+        """Make a table (count, size) for the numbers of all entries.
+
+        Returns the table, and for each entry the view of it that the entry's numbers go into, as (n, numbers) and, if
+        it has one number, as (n,).
+        """
         table = np.empty((count, self.size))
         return table, [
             (entry, table[:, place], table[:, place.start] if len(entry.names) == 1 else table[:, place])

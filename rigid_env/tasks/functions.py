@@ -1,4 +1,4 @@
-"""Call a task's NumPy functions once in a control step, check their results, and write them into the batch."""
+"""Calls of a task's NumPy functions in each control step, with checks of the results that they return."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from rigid_env.tasks.worlds import Worlds
 
 
 class Functions:
-    """Calls of the functions of a task without compiled ones.
+    """Caller of the NumPy functions of a task that is not compiled; it checks and stores their results.
 
-    Each function is called once when the object is made, in a world at its start, with drawn values. This rehearsal
-    shows a mistake at once.
+    The constructor calls each function once for world 0, with drawn values. This rehearsal finds a mistake before the
+    first episode.
 
     Parameters
     ----------
     task : Called
-        Gets the names of its `measures` and `terms` by the first calls.
+        The task. The first call of `measure` and `rewards` gives it the names `measures` and `terms`.
     is_first : bool
-        False: the names are there, as in a copy.
+        False skips the rehearsal, for a copy of a task, which has these names already.
 
     Raises
     ------
     ValueError
-        A function gives what it may not: names the function, the value and what is allowed.
+        A function returns a wrong result: names the function, the result and what is allowed.
     """
 
     def __init__(self, task: Called, is_first: bool = True):
@@ -53,7 +53,7 @@ class Functions:
         self.undo = StepUndo(task)
 
     def _rehearse(self) -> None:
-        """Call each function once in world 0, with values drawn for it; errors say that this is a rehearsal."""
+        """Call each function once in world 0, with drawn values, and restore the world; errors mention it."""
         task = self.task
         world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
         values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
@@ -75,7 +75,10 @@ class Functions:
                 task.drawn[name][0] = array
 
     def _call_each(self, values: Mapping[str, np.ndarray]) -> None:
-        """Call each function for two rows of world 0, so that no wrong shape fits by chance."""
+        """Call each function with two rows that both stand for world 0, so that a wrong shape does not fit by chance.
+
+        `values` are the drawn values of one episode, by name. The call sets the task's `measures` and `terms`.
+        """
         task = self.task
         task.move(np.zeros(1, dtype=np.int64), values, {})
         worlds = Worlds(task, np.zeros(2, dtype=np.int64))
@@ -95,7 +98,7 @@ class Functions:
             raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
 
     def begin(self, rows: np.ndarray) -> None:
-        """Observe worlds `rows` (n,) in which episodes begin."""
+        """Write the first observations and measures of the episodes that begin in worlds `rows` (n,) into the task."""
         task = self.task
         worlds = Worlds(task, rows)
         self._measure(worlds)
@@ -110,7 +113,7 @@ class Functions:
         task.outcome[rows], task.obs[rows] = outcome, obs
 
     def step(self, actions: np.ndarray) -> None:
-        """Move and observe all worlds; after an error nothing has changed."""
+        """Advance all worlds by one control step, and observe them; after an error the task is as before."""
         task = self.task
         task.given[...] = actions
         if not np.isfinite(task.given).all():
@@ -135,7 +138,7 @@ class Functions:
         task.outcome[...], task.obs[...] = outcome, self._obs
 
     def _look(self, worlds: Worlds) -> Mapping:
-        """Call the functions that read a state, in their order; return the terms of the reward."""
+        """Call `measure`, `update`, `success`, `failure`, `rewards` in this order; return the terms of the reward."""
         task = self.task
         self._measure(worlds)
         task.update(worlds)
@@ -147,7 +150,7 @@ class Functions:
         worlds.measured = Named(self._numbers("measure", self.task.measure(worlds), len(worlds)), "measured")
 
     def _numbers(self, function: str, values, count: int) -> dict:
-        """Check a function's result before others read it: a dict of numbers, one for each world or one for all."""
+        """Check that a function's result is a dict of numbers, each (count,) or one for all; return it."""
         if type(values) is not dict:
             raise ValueError(f"{function} of {self._name} gave {values!r}; allowed is a dict of arrays by name")
         shape = (count,)
@@ -169,7 +172,7 @@ class Functions:
         return values
 
     def _fill(self, function: str, values: Mapping, names: tuple[str, ...], out: np.ndarray, first: int) -> None:
-        """Write numbers by name into the columns of `out` from `first` on."""
+        """Write the numbers of a function's result into columns of `out` from `first` on; other names are refused."""
         if tuple(values) != names:
             raise ValueError(
                 f"{function} of {self._name} gave the names {', '.join(map(repr, values))}; allowed are those of its "
@@ -179,9 +182,21 @@ class Functions:
             out[:, k] = value
 
     def _check_finite(self, outcome: np.ndarray, seen: np.ndarray, obs: np.ndarray, indices: np.ndarray) -> None:
-        """Refuse numbers that are not finite, in outcomes, entries (`seen`) and observations."""
+        """Raise a ValueError if a number is not finite, with its name and its world.
+
+        Parameters
+        ----------
+        outcome : (n, numbers) float64
+            Rewards, flags, measures and terms.
+        seen : (n, entries) float64
+            Observations before scaling and clipping.
+        obs : (n, entries) float32
+            Observations.
+        indices : (n,) int64
+            Worlds of the rows.
+        """
         with np.errstate(invalid="ignore", over="ignore"):
-            total = outcome.sum() + seen.sum() + obs.sum()  # not finite if one of the numbers is not
+            total = outcome.sum() + seen.sum() + obs.sum()  # not finite if any number is not
         if math.isfinite(total):
             return
         task = self.task
@@ -191,6 +206,6 @@ class Functions:
         bad = np.argwhere(~np.isfinite(table))
         if len(bad) == 0:
             return
-        row, column = min(bad.tolist(), key=lambda place: (place[1] == col.REWARD, place))  # the term before the sum
+        row, column = min(bad.tolist(), key=lambda place: (place[1] == col.REWARD, place))  # a term before the sum
         what = f"{names[column]} of {self._name} is {table[row, column]} in world {indices[row]}"
         raise ValueError(f"{what}; allowed are finite numbers")

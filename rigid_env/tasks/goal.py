@@ -1,4 +1,4 @@
-"""Tasks with goals: observations that contain the desired and the achieved goal."""
+"""Goal-conditioned tasks: their observations contain the desired and the achieved goal."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ REWARDS = ("sparse", "dense")
 
 
 class GoalTask(Task):
-    """Task whose reward and success follow from two rows of numbers, the desired and the achieved goal.
+    """Goal-conditioned task: reward and success depend only on the desired and the achieved goal, two rows of numbers.
 
-    An algorithm may compute the reward of another goal than the desired one, as hindsight experience replay does.
-    Success does not end an episode, since a goal is to be kept.
+    So an algorithm can compute the reward for another desired goal, as hindsight experience replay does. Success does
+    not end an episode, since the goal is to be kept.
 
     A subclass declares `goal_entries`, and defines `desired` and `shortfall`.
 
     Parameters
     ----------
     reward : {"sparse", "dense"}
-        Sparse: 0 where the goal is reached, else -1. Dense: minus the shortfall, at most 1 where it is reached.
+        Sparse: 0 where the goal is reached, else -1. Dense: minus the shortfall, which is at most 1 at a reached goal.
     settings
         As of `Task`.
 
     Attributes
     ----------
     goal_entries : sequence of Entry
-        Declared: names, units and bounds of a goal's numbers, which `read` gives as they are achieved.
+        Declared by the subclass: names, units and bounds of a goal's numbers. Their `read` gives the achieved goal.
     achieved_goal, desired_goal : (worlds, numbers) float32
-        Of the running episodes, renewed in place.
+        Goals of the running episodes, updated in place in each control step.
 
     References
     ----------
@@ -57,39 +57,40 @@ class GoalTask(Task):
 
     @property
     def goals(self) -> Observation:
-        """Entries of a goal."""
+        """Entries of the numbers of a goal."""
         return self._goals
 
     @abstractmethod
     def desired(self, worlds) -> np.ndarray:
-        """Desired goals (n, numbers) before scaling, as `read` of `goal_entries` gives them.
+        """Desired goals (n, numbers) of the n worlds, in the units of `goal_entries`, before scaling.
 
-        Observations contain them like the achieved goals: divided by the scales, and clipped to the bounds.
+        Observations contain them divided by the entries' scales and clipped to their bounds, as they do achieved goals.
         """
 
     @abstractmethod
     def shortfall(self, achieved: np.ndarray, desired: np.ndarray) -> np.ndarray:
-        """Return the distance of an achieved goal from a desired one.
+        """Return the distance of an achieved goal from a desired one, relative to the tolerance.
 
         Parameters
         ----------
         achieved, desired : (..., numbers) float
-            As observed.
+            Goals as in observations: scaled and clipped.
 
         Returns
         -------
         (...,) float64
-            0 where they are the same, at most 1 where the goal counts as reached.
+            0 where the goals are the same, at most 1 where the desired goal counts as reached.
         """
 
     def compute_reward(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Reward of achieving one goal where another is wanted.
+        """Reward for an achieved goal, given a desired goal.
 
         Parameters
         ----------
         achieved_goal, desired_goal : (..., numbers) array_like
+            Goals as in observations.
         info : anything
-            Not looked at: Gymnasium's interface hands it over.
+            Ignored; Gymnasium's interface for goals passes it.
 
         Returns
         -------
@@ -98,32 +99,32 @@ class GoalTask(Task):
         Raises
         ------
         ValueError
-            Goals of other sizes.
+            Goals with a wrong number of entries.
         """
         shortfall = self._shortfall(achieved_goal, desired_goal)
         return np.where(shortfall <= 1.0, 0.0, -1.0) if self.reward == "sparse" else -shortfall
 
     def compute_terminated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Say whether an episode would end by achieving one goal where another is wanted.
+        """Tell whether an achieved goal ends the episode, given a desired goal.
 
         Arguments and errors as of `compute_reward`.
 
         Returns
         -------
         (...,) bool
-            Goals that are reached, of a subclass with ``ends_on_success``; else none.
+            True for reached goals if the class has ``ends_on_success``; else False.
         """
         return (self._shortfall(achieved_goal, desired_goal) <= 1.0) & self.ends_on_success
 
     def compute_truncated(self, achieved_goal, desired_goal, info: Any = None) -> np.ndarray:
-        """Say whether goals end an episode before its time, (...,) bool: none does, only the limit of steps.
+        """Return False for every pair of goals, (...,) bool: only the limit of steps truncates an episode.
 
         Arguments and errors as of `compute_reward`.
         """
         return np.zeros_like(self._shortfall(achieved_goal, desired_goal), dtype=bool)
 
     def _shortfall(self, achieved_goal, desired_goal) -> np.ndarray:
-        """`shortfall` of goals that are checked."""
+        """Call `shortfall` after a check that both goals have the right number of entries."""
         achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
         size = self._goals.size
         for name, goal in (("achieved_goal", achieved), ("desired_goal", desired)):
@@ -132,14 +133,14 @@ class GoalTask(Task):
         return self.shortfall(achieved, desired)
 
     def is_reached(self, achieved_goal, desired_goal) -> np.ndarray:
-        """Goals (...,) bool that count as reached."""
+        """Flags (...,) bool of goals that count as reached, for achieved and desired goals (..., numbers)."""
         achieved, desired = (np.asarray(goal, dtype=np.float64) for goal in (achieved_goal, desired_goal))
         return self.shortfall(achieved, desired) <= 1.0
 
-    # --- functions of the task ----------------------------------------------------------------------------
+    # --- functions that a task declares -------------------------------------------------------------------
 
     def measure(self, worlds):
-        """Store both goals, and return the shortfall."""
+        """Store the achieved and the desired goals of these worlds, and return the shortfall."""
         rows, goals = worlds.indices, self._goals
         achieved = np.empty((len(worlds), goals.size), dtype=np.float32)
         self._check_goals("achieved", goals.read(worlds, achieved), rows)
@@ -150,7 +151,7 @@ class GoalTask(Task):
         return {"shortfall": self.shortfall(*self._both(rows))}
 
     def _check_goals(self, which: str, values: Any, rows: np.ndarray) -> None:
-        """Refuse goals that are not finite numbers of the right shape."""
+        """Raise a ValueError if goals of worlds `rows` are not finite or of a wrong shape; `which` names them."""
         name, shape = type(self).__name__, (len(rows), self._goals.size)
         if not isinstance(values, np.ndarray) or values.shape != shape or values.dtype.kind not in "fiub":
             given = f"{values.dtype} of shape {values.shape}" if isinstance(values, np.ndarray) else shown(values)
@@ -164,7 +165,7 @@ class GoalTask(Task):
             raise ValueError(f"{what}; allowed are finite numbers")
 
     def success(self, worlds):
-        """The goal is reached."""
+        """Success: the desired goal is reached."""
         return worlds.measured["shortfall"] <= 1.0
 
     def rewards(self, worlds):
@@ -176,11 +177,11 @@ class GoalTask(Task):
         return self.achieved_goal[rows].astype(np.float64), self.desired_goal[rows].astype(np.float64)
 
     def own_settings(self):
-        """Kind of reward."""
+        """Kind of reward, as a setting that must agree where a state is restored."""
         return {"reward": self.reward}
 
     def own_arrays(self):
-        """Arrays of both goals."""
+        """Achieved and desired goals, as arrays that belong to the task's state."""
         return {"achieved goal": self.achieved_goal, "desired goal": self.desired_goal}
 
     def __getstate__(self):

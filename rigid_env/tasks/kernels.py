@@ -1,11 +1,12 @@
-"""Compiled parts of the block's tasks: starts, observations, rewards, success.
+"""Kernels of the block's tasks: starting poses, observations, rewards and success.
 
-Everything is in this one file because Numba's disk cache notices a change only in the file of the function it
-calls (callees in `physics.kernels` are covered by the name of the cache folder).
+All of them are in this one file, because Numba's disk cache checks only the file of the function that is called. A
+change in another file would go unnoticed, apart from files of `physics.kernels`, which the name of the cache folder
+covers.
 
-Rewards are differences of a potential of the state, plus costs and the bonus of success. Differences of a
-potential leave the best policy what it is (Ng, Harada and Russell, *Policy invariance under reward
-transformations*, ICML 1999; here with discount 1).
+The reward is the gain of a potential of the state, minus costs, plus a bonus for success. Gains of a potential do not
+change the best policy (Ng, Harada and Russell, *Policy invariance under reward transformations*, ICML 1999; here with
+discount 1).
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from physics.kernels.parallel.work_stealing import TAKEN_COUNT, TAKEN_FIRST_WORL
 from physics.kernels.state import layout as at
 from rigid_env.tasks import layout as col
 
-AXES = 6  # of an action: force x, y, z, torque x, y, z
+AXES = 6  # numbers of an action: force x, y, z, torque x, y, z
 
 # --- scales and bounds of observations: an entry is value / scale, clipped to ± bound ---------------------
 LENGTH_SCALE = 5.0  # [m]
 LENGTH_BOUND = 10.0
-NEAR_SCALE = 1.0  # [m], of the goal's squashed coordinates: fine near the goal, flat far away
+NEAR_SCALE = 1.0  # [m] scale of tanh of the goal's offset, which changes much near the goal and little far away
 HEIGHT_SCALE = 2.5  # [m]
 SPEED_SCALE = 5.0  # [m/s]
 SPIN_SCALE = 5.0  # [rad/s]
@@ -43,16 +44,16 @@ STEP_COST = 0.01
 ACTION_COST = 0.0005  # times the sum of the squared action
 HOLD_VALUE = 1.0  # potential of a completed hold
 REACH_VALUE = 0.5  # potential lost per metre of distance [1/m]
-BRAKE_VALUE = 0.2  # potential lost per m/s at the goal [s/m] ...
-BRAKE_RANGE = 2.0  # ... and 1/e of that so far away [m]
+BRAKE_VALUE = 0.2  # potential lost per m/s at the goal [s/m]; it decays with the distance from the goal
+BRAKE_RANGE = 2.0  # distance at which this loss is 1/e of the loss at the goal [m]
 TURN_VALUE = 2.0  # potential lost per radian off the goal [1/rad]
-CALM_VALUE = 0.1  # potential lost per m/s and rad/s with the face down ...
-CALM_RANGE = 0.3  # ... and 1/e of that at this angle [rad]
+CALM_VALUE = 0.1  # potential lost per m/s and per rad/s with the face down; it decays with the angle
+CALM_RANGE = 0.3  # angle at which this loss is 1/e of the loss with the face down [rad]
 
 
 @inlined
 def clip(x, low, high):
-    """x limited to [low, high]."""
+    """Limit x to the interval from low to high."""
     return min(max(x, low), high)
 
 
@@ -64,20 +65,22 @@ def norm3(a, b, c):
 
 @entry_kernel
 def start_poses(place, yaw, faces, half, pos, quat):
-    """Poses of blocks that lie on the floor y = 0.
+    """Write the poses of blocks that lie on the floor y = 0.
 
     Parameters
     ----------
     place : (n, 2) float64
-        x and z of the centre [m].
+        x and z of the block's centre [m].
     yaw : (n,) float64
-        About the vertical [rad].
+        Angle about the vertical [rad].
     faces : (n,) float64
-        Face that is down, 0 to 5.
+        Face on the floor: 0 to 5 for -x, +x, -y, +y, -z, +z.
     half : (n, 3) float64
         Half edges [m].
     pos : (n, 1, 3) float64, out
+        Centres [m].
     quat : (n, 1, 4) float64, out
+        Unit quaternions, body to world.
     """
     s = math.sqrt(0.5)
     for i in range(place.shape[0]):
@@ -105,7 +108,10 @@ def start_poses(place, yaw, faces, half, pos, quat):
 
 @inlined
 def observe_motion(world, first, state, obs):
-    """Write height and velocities into obs[world, first : first + 7]; return speed [m/s] and spin [rad/s]."""
+    """Write the block's height and velocities, scaled and clipped, into obs[world, first : first + 7].
+
+    Returns speed [m/s] and spin [rad/s].
+    """
     vx, vy, vz = state[world, at.LINVEL], state[world, at.LINVEL + 1], state[world, at.LINVEL + 2]
     wx, wy, wz = state[world, at.ANGVEL], state[world, at.ANGVEL + 1], state[world, at.ANGVEL + 2]
     obs[world, first] = clip(state[world, at.POS + 1] / HEIGHT_SCALE, 0.0, LENGTH_BOUND)
@@ -120,7 +126,10 @@ def observe_motion(world, first, state, obs):
 
 @inlined
 def observe_gaps(world, first, state, R, record, walls, obs):
-    """Write smallest distances of the block's corners from the three walls into obs[world, first : first + 3]."""
+    """Write the gaps between the block and the three walls, scaled and clipped, into obs[world, first : first + 3].
+
+    `R` has the rotation matrix of the block, nine numbers row by row; `record` has its half edges.
+    """
     for k in range(3):
         nx, ny, nz = walls[k, at.WALL_NORMAL], walls[k, at.WALL_NORMAL + 1], walls[k, at.WALL_NORMAL + 2]
         gap = nx * state[world, at.POS] + ny * state[world, at.POS + 1] + nz * state[world, at.POS + 2]
@@ -132,7 +141,7 @@ def observe_gaps(world, first, state, R, record, walls, obs):
 
 @inlined
 def attitude(world, state):
-    """Rotation matrix of the block, body to world, nine scalars row by row."""
+    """Rotation matrix of the block in a world, body to world: nine numbers row by row."""
     return to_matrix(
         (
             state[world, at.QUAT],
@@ -145,7 +154,28 @@ def attitude(world, state):
 
 @inlined
 def conclude(world, is_met, potential, error, speed, spin, actions, record, outcome):
-    """Count the hold, then write reward and success of one world; `actions` is None at the start of an episode."""
+    """Count the hold of one world, and write its reward and success.
+
+    Parameters
+    ----------
+    world : int
+    is_met : bool
+        Whether the goal is reached now; speed and spin are checked here.
+    potential : float
+        Potential of the state, without the part of the hold.
+    error, speed, spin : float
+        Distance [m] or angle [rad] to the goal, speed [m/s] and spin [rad/s] of the block.
+    actions : (worlds, 6) float64 or None
+        Actions of the last control step; None at the start of an episode, which gives no reward.
+    record : (worlds, RECORD_SIZE) float64, in and out
+        POTENTIAL and HOLD are updated.
+    outcome : (worlds, OUTCOME_SIZE) float64, out
+
+    Returns
+    -------
+    float
+        Share of the hold that is completed, for the observation.
+    """
     hold = effort = 0.0
     if actions is not None and is_met and speed <= REST_SPEED and spin <= REST_SPIN:
         hold = record[world, col.HOLD] + 1.0
@@ -173,18 +203,19 @@ def conclude(world, is_met, potential, error, speed, spin, actions, record, outc
 
 @kernel
 def observe_reach(taken, state, record, walls, actions, obs, outcome):
-    """BlockReach: observation, reward and success of some worlds.
+    """Write observation, reward and success of the task BlockReach for some worlds.
 
     Parameters
     ----------
     taken : (TAKEN_FIRST_WORLD + n or more,) int64
-        Worlds to look at, listed as in `physics.kernels.parallel.work_stealing`; the rest of the outputs is left alone.
+        List of the n worlds, as in `physics.kernels.parallel.work_stealing`; output rows of other worlds stay
+        unchanged.
     state : (worlds, STATE_SIZE) float64
     record : (worlds, RECORD_SIZE) float64, in and out
-        POTENTIAL and HOLD are renewed.
+        POTENTIAL and HOLD are updated.
     walls : (3, WALL_SIZE) float64
     actions : (worlds, 6) float64 or None
-        That led here; None at the start of an episode.
+        Actions of the last control step; None at the start of an episode.
     obs : (worlds, 24) float32, out
     outcome : (worlds, OUTCOME_SIZE) float64, out
     """
@@ -210,11 +241,11 @@ def observe_reach(taken, state, record, walls, actions, obs, outcome):
 
 @kernel
 def observe_reorient(taken, state, record, walls, actions, obs, outcome):
-    """BlockReorient: observation, reward and success of some worlds; arguments as `observe_reach`.
+    """Write observation, reward and success of the task BlockReorient for some worlds.
 
-    The body axes are given in the order of the goal: first the outward normal of the target face, then the next two
-    body axes in cyclic order, with the half edges in the same order. So the policy need not know which face it is. obs
-    is (worlds, 23) float32.
+    Arguments as of `observe_reach`, with obs (worlds, 23) float32. The observation has the body axes in the order of
+    the goal: first the outward normal of the target face, then the next two body axes in cyclic order. The half edges
+    have the same order. So the policy need not know which face is the target.
     """
     for i in range(taken[TAKEN_COUNT]):
         world = taken[TAKEN_FIRST_WORLD + i]
@@ -230,7 +261,7 @@ def observe_reorient(taken, state, record, walls, actions, obs, outcome):
             obs[world, 3 * j + 1] = clip(s * column[1], -1.0, 1.0)
             obs[world, 3 * j + 2] = clip(s * column[2], -1.0, 1.0)
             obs[world, 9 + j] = clip(record[world, col.HALF + k] / HEIGHT_SCALE, 0.0, LENGTH_BOUND)
-        height = sign * (R[3] if axis == 0 else (R[4] if axis == 1 else R[5]))  # of the normal's tip
+        height = sign * (R[3] if axis == 0 else (R[4] if axis == 1 else R[5]))  # world y of the normal
         speed, spin = observe_motion(world, 12, state, obs)
         observe_gaps(world, 19, state, R, record, walls, obs)
         angle = math.acos(clip(-height, -1.0, 1.0))

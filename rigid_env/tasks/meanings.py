@@ -1,4 +1,4 @@
-"""Meanings of arguments and draws, in words for the documentation of a task."""
+"""Short explanations of arguments and draws, for the tables in a task's documentation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ARGUMENTS = {
     "dump_faults": "folder for what led to a state that was not finite (`rigid-env replay`)",
     "threads": "threads that share a step of a batch",
 }
-"""Meanings of the arguments that all tasks have."""
+"""Explanations of the arguments that all tasks have, by name."""
 
 OF_ENVIRONMENTS = {
     "render_mode": '`"rgb_array"`, `"human"` or None',
@@ -30,7 +30,7 @@ OF_ENVIRONMENTS = {
     "camera": "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None sees the room",
     "arrows": "whether pictures show contacts, forces and torques",
 }
-"""Meanings of the arguments that environments add."""
+"""Explanations of the arguments that environments add to those of a task, by name."""
 
 PARAMETERS = {
     "mass": "mass [kg]",
@@ -40,11 +40,11 @@ PARAMETERS = {
     "restitution": "restitution",
     "gravity": "strength of gravity [m/s²]",
 }
-"""Meanings of draws that are physical parameters."""
+"""Explanations of draws that are physical parameters, by name."""
 
 
 def draw_meaning(name: str) -> str:
-    """Meaning of a draw, with its unit where it is a physical parameter."""
+    """Explanation of a draw by its name, with the unit of a physical parameter; "the task's own" for any other draw."""
     found = parameter_of(name)
     if found is None:
         return "the task's own"
@@ -53,7 +53,21 @@ def draw_meaning(name: str) -> str:
 
 
 def argument_meaning(kind: type, name: str) -> str:
-    """Meaning of an argument: of a draw of its name, or of the docstrings' ``Parameters``."""
+    """Explanation of a constructor's argument.
+
+    Parameters
+    ----------
+    kind : type
+        Class of the task.
+    name : str
+        Name of the argument.
+
+    Returns
+    -------
+    str
+        Explanation of the draw with this name, or the text under ``Parameters`` in the docstring of the class or of its
+        first base that has one; else "".
+    """
     if parameter_of(name):
         return draw_meaning(name)
     for owner in kind.__mro__:

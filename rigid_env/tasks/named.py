@@ -1,4 +1,4 @@
-"""Numbers by name, for a task's functions."""
+"""Dict of arrays by name that a task's functions read."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from physics.keywords import nearest_first
 
 
 class Named(dict):
-    """Arrays by name. The error for an unknown name lists the known ones.
+    """Dict of arrays by name, whose error for an unknown name lists the known ones.
 
     Parameters
     ----------
     arrays : dict of str to array
     what : str
-        What they are, for errors.
+        Name of the dict in errors, such as "memory".
     is_written : bool
-        Whether functions may write: a new value is then copied into the array, so that ``memory["a"] = x`` and
-        ``memory["a"][:] = x`` do the same.
+        True lets functions assign: the new value is copied into the array, so that ``memory["a"] = x`` does the same as
+        ``memory["a"][:] = x``. False: an assignment raises a TypeError.
     """
 
     def __init__(self, arrays: dict[str, np.ndarray], what: str, is_written: bool = False):

@@ -1,4 +1,4 @@
-"""Options of `reset`, all checked before anything changes."""
+"""Check of the keys of options, such as those of `reset`."""
 
 from __future__ import annotations
 
@@ -12,14 +12,23 @@ from physics.keywords import nearest_first
 def require_known(
     options: Mapping[str, Any] | None, allowed: Iterable[str], field: str = "options"
 ) -> Mapping[str, Any]:
-    """Check the keys of options, or of another named mapping; return the mapping, an empty one for None.
+    """Check that the keys of a mapping are allowed, and return the mapping; an empty one for None.
+
+    Parameters
+    ----------
+    options : mapping or None
+        Usually the options of `reset`.
+    allowed : iterable of str
+        Allowed keys.
+    field : str
+        Name of the mapping in an error.
 
     Raises
     ------
     TypeError
-        They are no dict.
+        `options` is no mapping.
     ValueError
-        Naming a key that is not `allowed`, and the allowed ones, the nearest first.
+        Naming a key that is not allowed, and the allowed ones, the nearest first.
     """
     if options is None:
         return {}

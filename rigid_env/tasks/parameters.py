@@ -1,4 +1,4 @@
-"""Physical parameters that may differ between episodes, and their form as arguments of the block's tasks."""
+"""Physical parameters that may differ between episodes, and how arguments of the block's tasks give them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.distributions import Uniform
 
 Number = float | Sequence[float] | NDArray[Any] | Distribution
-"""Type of an argument: a value, a range (low, high) to draw from, or a distribution."""
+"""Type of an argument for one number: a fixed value, a pair (low, high) for a uniform range, or a distribution."""
 
 Edges = Sequence[float] | Sequence[Sequence[float]] | NDArray[Any] | Distribution
-"""Type of an argument: edges of the block [m], a range of them, or a distribution."""
+"""Type of an argument for the block's three edges [m]: fixed values, a pair of them for a range, or a distribution."""
 
 CHECKS = {
     "mass": validation.positive,
@@ -26,32 +26,32 @@ CHECKS = {
     "gravity": validation.positive,
     "radius": validation.positive,
 }
-"""Check of each parameter's values."""
+"""Function for each parameter that checks whether values are in the allowed range."""
 
 LENGTHS = {"mass": 1, "size": 3, "friction": 1, "restitution": 1, "gravity": 1}
-"""Number of numbers in each parameter, in the order in which the block's tasks draw them."""
+"""Length of a value of each parameter, in the order in which the block's tasks draw the parameters."""
 
 DRAWN_LENGTHS = {**LENGTHS, "radius": 1}
-"""Number of numbers in each parameter that a task may draw; the radius of spheres has one, their size three."""
+"""Length of a value of each parameter that a task may draw: one for the radius of a sphere, three for a size."""
 
 OFF_MIDDLE = (0.25, 0.4, 0.75)
-"""Shares of a range of sizes at which a scene's block is no cube, if the middle is one."""
+"""Shares of a range of sizes, one for each edge, near the middle but unequal, so that the block is no cube."""
 
 
 def parse_range(field: str, value: Any) -> Distribution:
-    """Distribution of a parameter from a user's value.
+    """Make a distribution from a user's value of a physical parameter.
 
     Parameters
     ----------
     field : str
-        Key of `CHECKS`.
+        Name of the parameter, a key of `LENGTHS`.
     value : number, (3,) numbers for the size, a pair (low, high) of either, or Distribution
         A pair is a uniform range.
 
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
     length = LENGTHS[field]
     if isinstance(value, Distribution):
@@ -76,14 +76,14 @@ def parse_range(field: str, value: Any) -> Distribution:
 
 
 def middle(distribution: Distribution) -> np.ndarray:
-    """() or (k,) value in the middle of a distribution."""
+    """Value of a distribution, () or (k,), where all of its uniform numbers are 0.5."""
     return distribution.at(np.full((1, distribution.uniforms), 0.5), {})[0]
 
 
 def scene_size(distribution: Distribution) -> np.ndarray:
-    """Edges (3,) of the block that kernels are compiled for [m]: the middle of a range, but no cube.
+    """Edges (3,) of the block that kernels are compiled for [m]: the middle of the distribution, but no cube.
 
-    The kernel of a cube has no gyroscopic torque, which all other blocks of the range need.
+    Kernels for a cube leave out the gyroscopic torque, which other blocks of the distribution need.
     """
     size = middle(distribution)
     if distribution.is_fixed or np.ptp(size) > 0.0:

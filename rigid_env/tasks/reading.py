@@ -1,6 +1,6 @@
-"""Quantities of many worlds that are worked out from their state: rotations and gaps to walls.
+"""Rotation matrices of bodies and gaps to walls, computed from the state of many worlds.
 
-Compiled, each in one call for all worlds. An array of results has a row for each world of `indices`.
+Each quantity is computed by one compiled call. An array of results has a row for each world of `indices` (n,).
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ def _wall_gaps(indices, state, params, shapes, walls, out):
 
 
 def write_rotations(world: World, indices: np.ndarray, out: np.ndarray) -> None:
-    """Rotation matrices, body to world, into `out` (n, bodies, 3, 3)."""
+    """Write the rotation matrices of all bodies, body to world, into `out` (n, bodies, 3, 3)."""
     _rotations(indices, world.state, out)
 
 
 def write_wall_gaps(world: World, indices: np.ndarray, out: np.ndarray) -> None:
-    """Distances between bodies and walls [m] into `out` (n, bodies, walls); negative inside."""
+    """Write the gaps between all bodies and walls [m] into `out` (n, bodies, walls); negative where they overlap."""
     _wall_gaps(indices, world.state, world.params, world.shapes, world.walls, out)
     for b, body in enumerate(world.scene.bodies):
         if body.kind == "hull":

@@ -1,4 +1,4 @@
-"""Effects that a user gives instead of a task's own."""
+"""Effects that a user gives instead of those of a task's scene."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from collections.abc import Collection, Sequence
 import physics
 
 REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
-"""Parameter of a task that each effect replaces."""
+"""Parameter of a task that is fixed by an effect of each class."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:
-    """The effects as a tuple.
+    """Check a user's effects, and return them as a tuple.
+
+    `randomised` has the names of the parameters that the task draws from a range.
 
     Raises
     ------
     ValueError
-        They are no sequence, or one takes the place of a parameter that is drawn from a range.
+        `effects` is no sequence, or an effect fixes a parameter that is drawn from a range.
     """
     try:
         effects = tuple(effects)
@@ -29,12 +31,12 @@ def checked_effects(effects, randomised: Collection[str]) -> tuple:
 
 
 def replaced(effects: Sequence) -> dict[str, object]:
-    """Replaced parameters, each with the effect that replaces it."""
+    """Parameters that the given effects fix, each with its effect."""
     return {REPLACES[type(effect)]: effect for effect in effects if type(effect) in REPLACES}
 
 
 def refuse_replaced(effects: Sequence, fields: Collection[str], kind: str = "") -> None:
-    """Raise a ValueError if an effect replaces one of `fields`; the message begins with `kind`."""
+    """Raise a ValueError if an effect fixes one of the parameters `fields`; the message begins with the text `kind`."""
     for field, effect in replaced(effects).items():
         if field in fields:
             raise ValueError(f"{kind}{field} was given, but effects holds {effect!r}; allowed is one of the two")

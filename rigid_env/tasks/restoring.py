@@ -1,4 +1,4 @@
-"""Take the state of a task, and continue its worlds from one."""
+"""Copy the state of a task, and restore it, in all worlds or in chosen ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from physics.world import choice, restoring
 from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.state_settings import check_settings
 
-OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # parts that a task without an environment leaves out
+OF_ENVIRONMENTS = frozenset(("waiting", "ended", "pictures"))  # an environment's arrays, which a task alone ignores
 
 
 def capture(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None], worlds=None) -> TaskState:
@@ -23,16 +23,16 @@ def capture(task, arrays: Mapping[str, np.ndarray], seeds: Sequence[int | None],
     ----------
     task : Task
     arrays : mapping of str to (worlds, ...) array
-        More that goes along, of an environment.
-    seeds : sequence
-        Of the generators.
+        Arrays of the task's environment that belong to the state.
+    seeds : sequence of int or None
+        Seed of each world's random generator.
     worlds : (k,) array_like of int, or mask, optional
-        Worlds meant; None: all.
+        Worlds whose state is copied; None: all.
 
     Raises
     ------
     ValueError
-        A world that is not there, or named twice.
+        A world that does not exist, or one that is named twice.
     """
     chosen: Any = slice(None) if worlds is None else choice.world_indices(worlds, task.worlds)
     indices = range(task.worlds) if worlds is None else chosen.tolist()
@@ -56,20 +56,20 @@ def reinstate(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=N
     ----------
     task : Task
     arrays : mapping of str to (worlds, ...) array
-        As of `capture`; they are written.
+        Arrays of the task's environment, as of `capture`; they are overwritten.
     state : TaskState
     worlds, source
-        As of `physics.World.restore`.
+        Worlds that continue, and the worlds of the state that they continue from, as of `physics.World.restore`.
 
     Returns
     -------
     chosen, sources : (k,) int64
-        Worlds that changed, and the worlds of the state that they go on from.
+        Worlds that changed, and the worlds of the state that they continue from.
 
     Raises
     ------
     ValueError
-        It is no state, one of another task or of other settings, or indices out of range.
+        An object that is no state, the state of another task or of other settings, or indices out of range.
     """
     validation.instance(state, TaskState, "state", "what get_state gives")
     _check(task, arrays, state)
@@ -91,7 +91,7 @@ def reinstate(task, arrays: Mapping[str, np.ndarray], state: TaskState, worlds=N
 
 
 def remember(task, rows: np.ndarray | None = None) -> Undo:
-    """Copy a task, some worlds or all: to put it back is to go on from there."""
+    """Copy the state of worlds `rows` of a task (None: all), and return a function that restores it."""
     before = capture(task, {}, [None] * task.worlds, rows)
 
     def undo() -> None:
@@ -101,7 +101,10 @@ def remember(task, rows: np.ndarray | None = None) -> Undo:
 
 
 def _indices(worlds: int, held: int, targets: restoring.Targets) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of the worlds that change, and of those of the state from which they continue."""
+    """Return indices of the worlds that change, and of the worlds of the state from which they continue.
+
+    `worlds` and `held` are the numbers of worlds in the task and in the state.
+    """
     chosen = np.arange(worlds) if targets.worlds is None else targets.worlds
     if targets.source is not None:
         return chosen, targets.source
@@ -123,7 +126,10 @@ def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sou
 
 
 def _hold(task, state: TaskState, chosen: np.ndarray, sources: np.ndarray, is_all: bool) -> None:
-    """Give the task the held values of the state."""
+    """Give held values of the state's worlds `sources` to worlds `chosen` of the task.
+
+    `is_all` means that all worlds are restored: values that the state does not hold are then released.
+    """
     held = task.episodes.held
     for name, values in state.held.items():
         held.setdefault(name, np.zeros((task.worlds, *values.shape[1:])))[chosen] = values[sources]
@@ -144,7 +150,7 @@ def _put_generators(generators: list, states: Sequence[dict[str, Any] | None], c
 
 
 def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
-    """Refuse a state of another task, or of one with other settings or parts."""
+    """Raise a ValueError for a state of another task, or for one with other settings, arrays or worlds."""
     name = type(task).__name__
     if state.task != name:
         raise ValueError(f"state is {state!r}; allowed are states of {name}")
@@ -161,7 +167,7 @@ def _check(task, arrays: Mapping[str, np.ndarray], state: TaskState) -> None:
     for own in (kept, arrays):
         for part, array in own.items():
             value = given[part]
-            if not is_alike or value.shape != array.shape or value.dtype is not array.dtype:  # rarely
+            if not is_alike or value.shape != array.shape or value.dtype is not array.dtype:  # a rare case
                 _check_part(part, value, array, count)
     _check_part("steps", given["steps"], task.status, count)
     for part in state.told:

@@ -1,4 +1,4 @@
-"""Rollouts of a task: a sequence of actions for each world, and the rewards that they earn."""
+"""Rollouts of a task: each world takes a sequence of actions, and the rewards are kept."""
 
 from __future__ import annotations
 
@@ -28,18 +28,20 @@ MEBIBYTE = 2**20
 
 @dataclass(frozen=True, eq=False)
 class TaskRollout:
-    """Rewards of a batch of worlds along a rollout.
+    """Results of a task's rollout: rewards, flags and observations of every control step, for each world.
 
     Attributes
     ----------
     rewards : (worlds, length) float64
+        Reward of each control step.
     success, failure : (worlds, length) bool
+        Flags of the task after each control step.
     observations : (worlds, samples, entries) float32 or None
-        None where they were not kept.
+        Observations after every so many control steps, as requested; None: none were requested.
     status : (worlds,) int64
-        Values of `physics.Status`: the gravest thing that happened in any step.
+        Gravest `physics.Status` of any step.
     ends_on_success : bool
-        Whether an episode ends with its success.
+        Whether success ends an episode of the task.
     """
 
     rewards: NDArray[np.float64]
@@ -51,7 +53,7 @@ class TaskRollout:
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """Number of control steps (worlds,) int64 up to the first that ends an episode, itself included; else all."""
+        """Length (worlds,) int64 of each episode: control steps up to its end, inclusive; all if it does not end."""
         ends = self.failure | self.success if self.ends_on_success else self.failure
         return np.where(ends.any(axis=1), ends.argmax(axis=1) + 1, ends.shape[1])
 
@@ -67,7 +69,7 @@ class TaskRollout:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the arrays [bytes]."""
+        """Memory that the arrays take [bytes]."""
         arrays = (self.rewards, self.success, self.failure, self.observations, self.status)
         return sum(array.nbytes for array in arrays if array is not None)
 
@@ -95,8 +97,8 @@ def rollout(
 ) -> TaskRollout:
     """Step every world of a task with its own sequence of actions, and keep the rewards.
 
-    A rollout has the same bits as `Task.step` with one action after another. No episode restarts. The arrays contain
-    the steps after the end of an episode, too, but `TaskRollout.returns` leaves them out. Afterwards the task is in the
+    A rollout has the same bits as `Task.step` with one action after another. No episode restarts. The arrays also
+    contain the steps after the end of an episode, which `TaskRollout.returns` leaves out. Afterwards the task is in the
     state after the last step.
 
     Parameters
@@ -106,32 +108,33 @@ def rollout(
     actions : (worlds, length, action_size) array_like
         Clipped to ±1.
     initial : TaskState, optional
-        Where all worlds begin: a state of one world for all of them, or of as many (``env.unwrapped.get_state()``).
-        None: where they are. Its generators decide which disturbances come: those that the environment will meet.
+        State that the worlds begin from (``env.unwrapped.get_state()``): of one world, which all worlds then begin
+        from, or of as many worlds. None: the present state of the task. The state's random generators decide the
+        disturbances, so these are the ones that the environment will meet.
     observations : bool
         Keep observations, too.
     every : int
-        Control steps from one observation that is kept to the next; a divisor of their number.
+        Control steps from one kept observation to the next; a divisor of the number of control steps.
     out : TaskRollout, optional
-        One of the same sizes, to be overwritten and returned.
+        Results of the same sizes, whose arrays are overwritten and returned.
 
     Returns
     -------
     TaskRollout
-        Its arrays take 10 bytes a control step, and 4 bytes a number of an observation that is kept.
+        Its arrays take 10 bytes a control step, and 4 bytes a number of a kept observation.
 
     Raises
     ------
     ValueError
-        An argument of the wrong shape or out of range, or more observations than this machine's memory holds; a
-        function of the task that gives what it may not. Nothing has changed then.
+        An argument of the wrong shape or out of range, more observations than this machine's memory holds, or a wrong
+        result of a function of the task. Nothing has changed then.
     RuntimeError
         Another thread is stepping or changing this world.
 
     Notes
     -----
-    Of a compiled task the loop runs in machine code, in each thread. One whose functions are NumPy is stepped from
-    Python, one call a control step for the whole batch, and so is one with impulses, disturbances, an actuator or
+    The loop of a compiled task runs in machine code, in each thread. Python steps a task with NumPy functions, with one
+    call a control step for the whole batch. It also steps a task with impulses, disturbances, an actuator or
     `dump_faults`.
     """
     validation.instance(task, Task, "task", "a Task, such as env.unwrapped.task")
@@ -154,7 +157,7 @@ def rollout(
 
 
 def _actions(task: Task, actions: ArrayLike) -> np.ndarray:
-    """`actions` as contiguous float64 (worlds, length, action_size), all finite."""
+    """Check `actions`, and return them as contiguous float64 (worlds, length, action_size), all finite."""
     allowed = f"({task.worlds}, length, {task.action_size})"
     array = validation.floats(actions, "actions", f"are numbers in shape {allowed}")
     if array.ndim != 3 or array.shape[1] == 0 or array.shape[::2] != (task.worlds, task.action_size):
@@ -163,7 +166,10 @@ def _actions(task: Task, actions: ArrayLike) -> np.ndarray:
 
 
 def _room(task: Task, length: int, samples: int, out: TaskRollout | None) -> Kept:
-    """Arrays for results: those of `out`, or new ones; refused where this machine's memory is too small."""
+    """Return arrays for the results: those of `out`, or new ones; refuse more than this machine's memory.
+
+    `samples` is the number of observations that are kept for each world.
+    """
     worlds, entries = task.obs.shape
     if out is not None:
         return _checked(out, worlds, length, (worlds, samples, entries))
@@ -189,7 +195,7 @@ def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, 
 
 
 def _needs_python(task: Task) -> bool:
-    """True if Python has work to do between two control steps."""
+    """True if Python must run between two control steps of the task, so that the loop cannot be compiled."""
     world = task.world
     if task.compiled is None or task.disturbed is not None or task.has_impulses:
         return True
@@ -197,7 +203,7 @@ def _needs_python(task: Task) -> bool:
 
 
 def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
-    """Take control steps from Python; return the gravest `status` of each world."""
+    """Take all control steps from Python, and write `kept`; return the gravest status (worlds,) of each world."""
     gravity = np.array([Status.severity(status) for status in Status])
     status = np.full(task.worlds, Status.OK, dtype=np.int64)
     for k in range(actions.shape[1]):
@@ -213,7 +219,7 @@ def _one_by_one(task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.n
 
 @exclusive
 def _all_at_once(world, task: Task, actions: np.ndarray, every: int, kept: Kept) -> np.ndarray:
-    """Take control steps in machine code; return the gravest `status` of each world."""
+    """Take all control steps in machine code, and write `kept`; return the gravest status (worlds,) of each world."""
     total, length, loop = np.zeros_like(world.report_table), actions.shape[1], task.rollout_loop
     arrays = (task.outcome, task.obs, world.report_table, total, kept)
     before = [bound_alike(None, begin_control, moment, actions, *task.wrench_arguments) for moment in loop.moments]

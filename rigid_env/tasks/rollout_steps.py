@@ -1,4 +1,4 @@
-"""Parts of a task's rollout after each control step of a block of worlds."""
+"""Kernel that a task's rollout calls after each control step of a block of worlds, to keep the results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigid_env.tasks import layout as col
 
 
 class Kept(NamedTuple):
-    """Arrays that a rollout keeps, with the worlds first."""
+    """Arrays in which a rollout keeps its results, with the worlds first."""
 
     rewards: np.ndarray  # (worlds, length) float64
     success: np.ndarray  # (worlds, length) bool
@@ -23,18 +23,20 @@ class Kept(NamedTuple):
 
 @kernel
 def end_control(moment, every, outcome, obs, report, total, kept):
-    """Keep rewards, flags and observations of a step, and add up reports.
+    """Keep rewards, flags and observations of one control step, and add its report to the total.
 
     Parameters
     ----------
     moment : (MOMENT_SIZE,) int64
-        Of `physics.world.rollout_loop`.
+        First and last world and the step, see `physics.world.rollout_loop`.
     every : int
-        Steps from one observation that is kept to the next.
+        Control steps from one kept observation to the next.
     outcome, obs : arrays of the task
+        Results of this control step, see `Task`.
     report, total : (worlds, REPORT_SIZE) float64
-        Of the step, and of all steps before, zero at first.
+        Report of this control step, and of all steps so far; the total is zero at first.
     kept : Kept
+        Arrays that the results are written into.
     """
     first, end, k = moment[FIRST], moment[END], moment[STEP]
     add_rows(first, end, total, report)

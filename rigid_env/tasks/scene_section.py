@@ -1,4 +1,4 @@
-"""Keys of a table [environment] of a scene file, or equal arguments, and errors that name their place."""
+"""Keys of the table [environment] of a scene file, or arguments of the same names; errors tell file and line."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ T = TypeVar("T")
 
 
 class Section:
-    """Keys and values, each to be checked when it is read.
+    """Table of a scene file or a dict of arguments, whose values are checked when they are read.
 
     Parameters
     ----------
     values : mapping
+        Values by key.
     name : str
-        In errors, such as ``environment.goal`` of a file or ``goal`` of arguments; "": nothing stands in front.
+        Name of the table in errors, such as ``environment.goal`` of a file or ``goal`` of arguments; "": none.
     lines : SourceLines, optional
-        Lines of the file. None: arguments.
+        Lines of the file, for errors. None: the values are arguments.
     """
 
     def __init__(self, values: Mapping[str, Any], name: str = "", lines: SourceLines | None = None):
@@ -33,32 +34,32 @@ class Section:
         return key in self.values
 
     def error(self, key: str | None, message: str) -> ValueError:
-        """An error about a key, or about the section itself."""
+        """Make an error with a message about a key (None: about the table itself); it tells file and line."""
         if self._places is not None:
             return self._places.error_in_table(self.name, key, message)
         return ValueError(f"{self.name}: {message}" if self.name else message)
 
     def require_known(self, allowed: Iterable[str]) -> None:
-        """Raise an error about a key that is not `allowed`, if there is one; it lists the nearest names first."""
+        """Raise an error if the table has a key that is not in `allowed`; it lists the nearest names first."""
         for key in self.values:
             if key not in allowed:
                 raise self.error(key, f"{key} is not known; allowed are {', '.join(nearest_first(key, allowed))}")
 
     def read(self, key: str, check: Callable[[Any, str], T]) -> T:
-        """Value of an existing key, after `check` (value, key), whose error gets the key's place."""
+        """Value of an existing key, as ``check(value, key)`` returns it; an error of `check` gets file and line."""
         try:
             return check(self.values[key], key)
         except ValueError as error:
             raise self.error(key, str(error)) from None
 
     def require(self, key: str, check: Callable[[Any, str], T], needed: str) -> T:
-        """Value of a required key; `needed` describes it in the error."""
+        """Value of a required key, checked as by `read`; the error for a missing key says what is `needed`."""
         if key not in self.values:
             raise self.error(None, f"{key} is missing; allowed is {needed}")
         return self.read(key, check)
 
     def part(self, key: str, allowed: Iterable[str]) -> Section:
-        """Table in this table, whose keys must be among `allowed`."""
+        """Table under a key of this table; an error if it is none, or has keys that are not in `allowed`."""
         name = f"{self.name}.{key}" if self.name else key
         values = self.values[key]
         if not isinstance(values, Mapping):
@@ -70,7 +71,7 @@ class Section:
 
 
 def body_indices(value, field: str, scene: physics.Scene) -> tuple[int, ...]:
-    """Indices of bodies, from a list of names and indices, or from one of them; each once, at least one."""
+    """Indices of bodies, each once, from names and indices or a single one; `field` names the value in an error."""
     given = list(value) if isinstance(value, (list, tuple)) else [value]
     if not given:
         raise ValueError(f"{field} is {shown(value)}; allowed is at least one body")

@@ -1,4 +1,4 @@
-"""Settings of a scene's environment: the table [environment] of its file, or arguments in place of its keys."""
+"""Settings of a scene's environment, from the table [environment] of its file or from arguments of the same names."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from rigid_env.tasks.observe import LENGTH, REACH
 from rigid_env.tasks.scene_section import Section, body_indices
 
 FORCE, TORQUE = 0.9, 0.5
-"""Largest force over a driven body's weight, and largest torque over weight times reach (`actions.Wrench`)."""
+"""Default limits of a driven body, as in `actions.Wrench`: force over weight, and torque over weight times reach."""
 
 LIMITS = {"force": FORCE, "torque": TORQUE}
-"""Keys of the limits, with their defaults."""
+"""Default of each key that limits the actions."""
 
 GOAL_SPEED = 0.1
-"""[m/s] Largest speed at which a goal counts as reached."""
+"""[m/s] Default of the largest speed at which a goal counts as reached."""
 
 KEYS = ("driven", "force", "torque", "frame", "length", "goal", "start", "frame_skip", "dt", "max_episode_steps")
 GOAL_KEYS = ("body", "pos", "low", "high", "tolerance", "speed")
 START_KEYS = ("pos", "linvel", "angvel")
 
 Driven = str | int | Sequence[str | int]
-"""Type of an argument: the names or indices of bodies, or that of one."""
+"""Type of the argument `driven`: names or indices of the bodies that the agent acts on, or a single one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SceneArguments:
-    """Arguments about what happens in a scene; see `rigid_env.tasks.scene_task.SceneTask`."""
+    """Arguments that replace keys of a scene file's table [environment]; see `rigid_env.tasks.scene_task.SceneTask`."""
 
     driven: Driven | None = None
     force: float | None = None
@@ -55,14 +55,14 @@ class SceneArguments:
 
 
 class Place(Uniform):
-    """Places that an observation in units of `length` covers.
+    """Uniform distribution of goals, which refuses an option of `reset` that an observation could not contain.
 
     Parameters
     ----------
     low, high : (3,) array_like
-        Ends [m].
+        Smallest and largest coordinates [m].
     length : float
-        [m].
+        Unit of lengths in observations [m].
     """
 
     def __init__(self, low, high, length: float):
@@ -77,17 +77,18 @@ class Place(Uniform):
 
 @dataclass(frozen=True)
 class Goal:
-    """Goal of a scene's environment.
+    """Goal of a scene's environment: one body is to be at a place, and slow.
 
     Attributes
     ----------
     body : int
-        Whose centre of mass is to be there.
+        Body whose centre of mass is to be at the place.
     place : Place
+        Distribution of the place.
     tolerance : float
-        Farthest from the goal [m].
+        Largest distance from the place at which the goal counts as reached [m].
     speed : float
-        Largest speed there [m/s].
+        Largest speed at which the goal counts as reached [m/s].
     """
 
     body: int
@@ -98,7 +99,10 @@ class Goal:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that `SceneTask` documents; `start` has half widths (3,) of the variation of each body's start."""
+    """Settings of a scene's environment; `SceneTask` documents them as arguments of the same names.
+
+    `start` has half widths (3,) of the random variation of each body's start, by the keys pos, linvel and angvel.
+    """
 
     driven: tuple[int, ...]
     force: float
@@ -113,13 +117,15 @@ class Settings:
 
 
 class SettingsReader:
-    """Reader of a scene's settings: arguments first, then the file.
+    """Reader of a scene's settings: an argument replaces the key of the same name in the file.
 
     Parameters
     ----------
     scene : physics.Scene
     file : SceneFile or None
+        File of the scene; None: there is none, so that only arguments count.
     given : SceneArguments
+        Arguments of the user; fields that are None are left to the file or the default.
     """
 
     def __init__(self, scene: physics.Scene, file: SceneFile | None, given: SceneArguments):
@@ -129,15 +135,15 @@ class SettingsReader:
         self._given = Section({key: value for key, value in part(given, SceneArguments).items() if value is not None})
 
     def section(self, key: str) -> Section:
-        """Section that contains a key."""
+        """Table that gives the value of a key: the arguments if they have the key, else the file's table."""
         return self._given if key in self._given else self._file
 
     def start_error(self, key: str, message: str) -> ValueError:
-        """An error about a key of the starts."""
+        """Make an error with a message about a key of the table `start`."""
         return self.section("start").part("start", START_KEYS).error(key, f"{key}: {message}")
 
     def settings(self) -> Settings:
-        """All settings.
+        """Read and check all settings.
 
         Raises
         ------
@@ -188,7 +194,7 @@ class SettingsReader:
 
 
 def _place(part: Section, length: float) -> Place:
-    """Distribution of a goal: fixed at `pos`, or uniform from `low` to `high`."""
+    """Distribution of a goal's place from the table `goal`: fixed at `pos`, or uniform from `low` to `high`."""
     if "pos" in part:
         for key in ("low", "high"):
             if key in part:
@@ -211,7 +217,7 @@ def _point(length: float):
 
 
 def _check_near(points: np.ndarray, field: str, farthest: float) -> None:
-    """Refuse goals that an observation would clip."""
+    """Raise a ValueError for points that observations would clip: a coordinate above `farthest` [m]."""
     if np.abs(points).max(initial=0.0) > farthest:
         raise ValueError(
             f"{field} is {shown(points.tolist())}; allowed are coordinates from {-farthest:g} to {farthest:g} m, "

@@ -1,4 +1,4 @@
-"""Find a scene, and further contents of its file, by the name of a canonical scene or by a file."""
+"""Find a scene, and the other tables of its file, by the name of a canonical scene or the path of a file."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from physics.keywords import nearest_first
 from physics.summary import shown
 
 MJCF_FILES = (".xml", ".urdf")
-"""Endings of files in MJCF, the format of MuJoCo, and in URDF, which MuJoCo reads, too."""
+"""Endings of files in MJCF, the format of MuJoCo, and in URDF, which the same reader loads."""
 
 SCENE_FILES = (".toml", *MJCF_FILES)
 """Endings of files that hold a scene."""
 
 ENDINGS = f"{', '.join(SCENE_FILES[:-1])} or {SCENE_FILES[-1]}"
-"""The same in words."""
+"""Endings of `SCENE_FILES` as words of a sentence."""
 
 SceneSource = physics.Scene | str | os.PathLike
-"""Type of an argument: a scene, the name of a canonical one, or a file."""
+"""Type of an argument: a scene, the name of a canonical scene, or the path of a file."""
 
 
 class Found(NamedTuple):
-    """Scene of a user, and further contents of its file.
+    """Scene of a user, and the contents of its file.
 
     Attributes
     ----------
     name : str
-        Short, for titles.
+        Short name for titles.
     scene : physics.Scene
     file : SceneFile or None
-        None: the scene is no file's, or that of a file in MJCF or URDF, which holds nothing else.
+        Contents of the scene file. None: the scene is from no file, or from a file in MJCF or URDF, which holds only a
+        scene.
     """
 
     name: str
@@ -44,7 +45,7 @@ class Found(NamedTuple):
 
 
 def find_scene(scene: SceneSource | None) -> Found:
-    """Scene given as an object, by the name of a canonical scene, or as a file.
+    """Find a user's scene: a scene object, the name of a canonical scene, or the path of a scene file.
 
     Raises
     ------

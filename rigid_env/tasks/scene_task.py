@@ -1,4 +1,4 @@
-"""SceneTask: the bodies of any scene, some of them driven, and a goal for one of them."""
+"""SceneTask: a task made from any scene, in which an agent drives some bodies and one body may have a goal."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ BONUS = 5.0
 """Reward of success."""
 
 START = "a start as far off as it may be"
-"""Subject of errors about starts inside a wall."""
+"""Subject of the error for starts inside a wall."""
 
 
 @dataclass(frozen=True)
 class SceneArgument:
-    """Scene of an environment; see `SceneTask`."""
+    """Argument for the scene of an environment; see `SceneTask`."""
 
     scene: SceneSource | None = None
 
@@ -40,17 +40,19 @@ class _Arguments(EngineArguments, SceneArguments, SceneArgument, BatchArguments)
 
 
 class SceneTask(Task):
-    """The batch behind `rigid_env.envs.scene.SceneEnv`, which documents it.
+    """Task of `rigid_env.envs.scene.SceneEnv` over a batch of worlds; the environment's docstring describes it.
 
     Parameters
     ----------
     worlds : int
+        Number of worlds.
     scene : physics.Scene, str or Path
-        A scene, the name of a canonical one, or a scene file, whose table [environment] has the settings below.
+        A scene, the name of a canonical scene, or the path of a scene file, whose table [environment] has the settings
+        below.
     driven, force, torque, frame, length, goal, start, frame_skip, dt
-        In place of the keys of that table; None: the file's, or the default. `goal` and `start` are dicts.
+        Replace the keys of that table; None: the file's value, or the default. `goal` and `start` are dicts.
     episode_steps : int, optional
-        In place of the key `max_episode_steps`, which `gymnasium.make` takes for itself.
+        Replaces the key `max_episode_steps`, a name that `gymnasium.make` takes for itself.
     accuracy, effects, draws, dump_faults, threads
         As of `Task`.
 
@@ -58,7 +60,7 @@ class SceneTask(Task):
     ----------
     settings : Settings
     name : str
-        Of the scene, for titles.
+        Name of the scene, for titles.
 
     Raises
     ------
@@ -92,7 +94,7 @@ class SceneTask(Task):
         return draws if goal is None else {**draws, "goal": goal.place}
 
     def _check_starts(self) -> None:
-        """Refuse starts that may lie deep inside a wall, by those nearest to each wall."""
+        """Refuse starts that may lie deep inside a wall: for each wall the start that is nearest to it is checked."""
         if "pos" not in self.settings.start:
             return
         bodies, chosen = self.world.body_count, np.zeros(1, dtype=np.int64)
@@ -106,7 +108,7 @@ class SceneTask(Task):
 
     @property
     def observation(self):
-        """Pose and velocities of every body, then the goal."""
+        """Entries of the observation: position, velocity, rotation, angular velocity of every body, then the goal."""
         length, entries = self.settings.length, []
         for body in range(len(self.scene.bodies)):
             entries += [observe.pos(body, length), observe.linvel(body, length)]
@@ -114,7 +116,7 @@ class SceneTask(Task):
         return entries if self.settings.goal is None else [*entries, observe.drawn("goal", 3, "m", length)]
 
     def place(self, drawn):
-        """Poses and velocities of the scene, plus the variation of the episode."""
+        """Poses and velocities of the scene, plus the random variation of the episode."""
         shape = (-1, self.world.body_count, 3)
         return {key: self._own_starts[key] + drawn[f"start_{key}"].reshape(shape) for key in self.settings.start}
 
@@ -127,39 +129,39 @@ class SceneTask(Task):
         return {"distance": np.linalg.norm(apart, axis=1), "speed": np.linalg.norm(velocity, axis=1)}
 
     def begin(self, worlds):
-        """Store the initial closeness of the body."""
+        """Store the closeness to the goal at the start of the episode."""
         if self.settings.goal is not None:
             worlds.memory["closeness"][...] = self._closeness(worlds)
 
     def update(self, worlds):
-        """Store the gain of closeness of the body."""
+        """Store the gain of closeness to the goal in this control step."""
         if self.settings.goal is not None:
             closeness = self._closeness(worlds)
             worlds.memory["gain"][...] = closeness - worlds.memory["closeness"]
             worlds.memory["closeness"][...] = closeness
 
     def success(self, worlds):
-        """(n,) bool: the body is at the goal, and slow."""
+        """Success (n,) bool: the body is within the tolerance of the goal, and at most as fast as the goal allows."""
         goal, measured = self.settings.goal, worlds.measured
         if goal is None:
             return super().success(worlds)
         return (measured["distance"] <= goal.tolerance) & (measured["speed"] <= goal.speed)
 
     def rewards(self, worlds):
-        """Gain of closeness, and a bonus for success."""
+        """Gain of closeness to the goal in this control step, and a bonus for success."""
         if self.settings.goal is None:
             return {}
         return {"progress": worlds.memory["gain"], "success": BONUS * worlds.success}
 
     def own_settings(self):
-        """Unit of lengths, and tolerances of the goal."""
+        """Unit of lengths and tolerances of the goal, as settings that must agree where a state is restored."""
         goal, length = self.settings.goal, {"length": self.settings.length}
         if goal is None:
             return length
         return {**length, "goal": f"body {goal.body} within {goal.tolerance!r} m at {goal.speed!r} m/s"}
 
     def goal_mark(self, world):
-        """Disc of the size of the body and the tolerance around it."""
+        """Disc around the goal with the bounding radius of the body plus the tolerance."""
         goal = self.settings.goal
         if goal is None:
             return None
@@ -169,5 +171,5 @@ class SceneTask(Task):
         return {"pos": self.drawn["goal"][world], "radius": radius, "reached": reached}
 
     def _closeness(self, worlds) -> np.ndarray:
-        """Closeness (n,): 0 at the goal, else -log(1 + distance / tolerance), the same at every scale."""
+        """Closeness to the goal (n,): -log(1 + distance / tolerance), which is 0 at the goal and has no unit."""
         return -np.log1p(worlds.measured["distance"] / self.settings.goal.tolerance)

@@ -1,4 +1,4 @@
-"""Starts of a task's episodes: draws, placement of bodies, and numbers that follow from their parameters."""
+"""Starts of a task's episodes: draw values, place the bodies, and update what depends on their parameters."""
 
 from __future__ import annotations
 
@@ -36,19 +36,19 @@ if TYPE_CHECKING:
     from rigid_env.tasks.draws import Draws
 
 PARAMETER_ROUNDING = 1e-12
-"""Relative error of a parameter after it was stored: an inverse, twice a half."""
+"""Largest relative rounding error of a parameter, which the world stores as an inverse or a half."""
 
 AT_STARTS = ("declared_draws", "place", "note_episodes")
-"""Functions of a compiled task that a start calls."""
+"""Functions of a compiled task that are called at the start of an episode."""
 
 UNIT_GRAVITY = 9.81
-"""[m/s²] Gravity in the unit of forces where a scene has none."""
+"""[m/s²] Gravity in the unit m g of forces, for a scene without gravity."""
 
 
 class Starts(Declaration):
-    """Part of `Task` that begins episodes, and gives the drawn values to worlds."""
+    """Part of `Task` that begins episodes, and writes their drawn values into the worlds."""
 
-    if TYPE_CHECKING:  # what `Task` makes and keeps
+    if TYPE_CHECKING:  # attributes that `Task` makes
         world: physics.World
         effects: tuple[Effect, ...]
         generators: list[np.random.Generator | None]
@@ -83,7 +83,7 @@ class Starts(Declaration):
         def distributions(self) -> dict[str, Distribution]: ...
 
     def seed(self, world: int, seed: int | None) -> int:
-        """Give one world a new generator, as `gymnasium.Env.reset` does; returns the seed."""
+        """Give one world a new random generator, as `gymnasium.Env.reset` does; returns its seed (None: random)."""
         self.generators[world], used = seeding.np_random(seed)
         return used
 
@@ -95,7 +95,8 @@ class Starts(Declaration):
         rows : (n,) int64
             Worlds.
         options : dict, optional
-            Fix what is otherwise drawn, each for all `rows` or one per row, by the names of the task's `draws`.
+            Values that are otherwise drawn, by the names of the task's `draws`; each has one value for all `rows`, or
+            one for each row.
 
         Raises
         ------
@@ -133,20 +134,22 @@ class Starts(Declaration):
             self.compiled(listed(rows), world.state, self.record, world.walls, None, self.obs, self.outcome)
 
     def _begin_gusts(self, rows: np.ndarray) -> None:
-        """Draw gusts anew, where the scene has any."""
+        """Draw new phases of the wind's gusts in worlds `rows`, if the scene has gusts."""
         count = gust_phases(self.world.plan)
         if count:
             begin_gusts(self.world, rows, np.array([self.generators[world].random(count) for world in rows]))
 
     def move(self, rows: np.ndarray, values: Mapping[str, np.ndarray], chosen: Mapping[str, np.ndarray]) -> None:
-        """Write poses and parameters of episodes with these values into the world; after an error nothing has changed.
+        """Write poses and physical parameters of new episodes into the world; after an error nothing has changed.
 
         Parameters
         ----------
         rows : (n,) int64
+            Worlds in which the episodes begin.
         values : mapping of str to (n,) or (n, k) array
+            Drawn values of the episodes, by name.
         chosen : mapping
-            Those of them that options fix.
+            Those of `values` that options of `start` fix.
         """
         told = self.episodes.varying | chosen.keys()
         changed = {name: values[name] for name in self.episodes.parameters if name in told}
@@ -159,11 +162,11 @@ class Starts(Declaration):
             raise ValueError(f"{what}: {error}") from None
 
     def _arguments(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Arguments of `World.set_parameters` for physical parameters by name."""
+        """Arguments of `World.set_parameters` for worlds `rows`, from physical parameters by name."""
         return world_arguments(values, self._parameters_of(rows)) if values else {}
 
     def _parameters_of(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Physical parameters of worlds `rows`: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
+        """Present physical parameters of worlds `rows` by name: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
         world = self.world
         params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
         return {
@@ -175,7 +178,7 @@ class Starts(Declaration):
         }
 
     def _unlike_scene(self) -> set[str]:
-        """Parameters fixed at values other than the scene's."""
+        """Names of physical parameters whose value differs from the scene's."""
         one = np.zeros(1, dtype=np.int64)
         taken = replaced(self.effects)
         of: Any = parameter_of
@@ -189,7 +192,7 @@ class Starts(Declaration):
         return found
 
     def _starts(self, values: Mapping[str, np.ndarray]) -> dict[str, Any]:
-        """Arguments of `World.set_state`: the scene's poses, replaced by those of `place`."""
+        """Arguments of `World.set_state` for new episodes: the scene's poses and velocities, or those of `place`."""
         given = self.place(values)
         if not isinstance(given, Mapping) or not set(given) <= set(self._own_starts):
             raise ValueError(
@@ -199,41 +202,43 @@ class Starts(Declaration):
         return {**self._own_starts, **given}
 
     def _check_starts(self) -> None:
-        """Refuse starts that are impossible for some draws, if a kind of task can tell before the draw."""
+        """Raise a ValueError if some draws lead to impossible starts; kinds of tasks that can tell override it."""
 
     @property
     def place_options(self) -> tuple[str, ...]:
-        """Options that decide the placement of bodies, for errors."""
+        """Options of `start` that decide where bodies are placed, for errors."""
         return self.option_names
 
     def _note_parameters(self, rows: np.ndarray) -> None:
-        """Update weights and the limits of actions, which follow from masses, sizes and gravity."""
+        """Update bodies' weights and the limits of actions in worlds `rows`, from masses, sizes and gravity."""
         self.weights[rows] = weights = self._weights(rows)
         params = self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows]
         reach = params[..., at.DIMENSIONS : at.DIMENSIONS + 3].max(axis=2)
         self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
 
     def _weights(self, rows: np.ndarray) -> np.ndarray:
-        """Weights (n, bodies) m g [N]."""
+        """Weights m g (n, bodies) of the bodies in worlds `rows` [N]."""
         gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
         gravity[gravity == 0.0] = UNIT_GRAVITY
         masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
         return masses * gravity[:, None]
 
     def hold(self, name: str, value) -> None:
-        """Hold a drawn value of every world from now on: a physical parameter at once, others from the next start.
+        """Hold a drawn value in all worlds, without drawing it again.
+
+        A physical parameter changes at once, any other value from the next episode on.
 
         Parameters
         ----------
         name : str
-            Of `drawn`.
-        value : array_like
-            One for all worlds or one for each; None: draw it again from the next episode on.
+            Name of the draw.
+        value : array_like or None
+            One value for all worlds or one for each; None: draw again from the next episode on.
 
         Raises
         ------
         ValueError
-            Out of range, or a size that reaches deep into a wall where the body is. Nothing has changed then.
+            A value out of range, or a size with which a body would reach deep into a wall. Nothing has changed then.
         """
         refuse_replaced(self.effects, (name,))
         if value is not None:
@@ -244,7 +249,7 @@ class Starts(Declaration):
         self._note_parameters(np.arange(self.worlds))
 
     def _change(self, name: str, value: np.ndarray) -> None:
-        """Set a parameter of all worlds to the values (worlds,) or (worlds, k); after an error nothing has changed."""
+        """Set a physical parameter in all worlds to values (worlds,) or (worlds, k); an error changes nothing."""
         try:
             arguments: Any = self._arguments(np.arange(self.worlds), {name: value})
             self.world.set_parameters(**arguments)
@@ -253,20 +258,20 @@ class Starts(Declaration):
 
     @cached_property
     def may_fail(self) -> bool:
-        """True if a user's code runs at the start of an episode, which may raise an error."""
+        """True if a user's code, which may raise an error, runs at the start of an episode."""
         parts = [getattr(type(self), name) for name in AT_STARTS]
         is_of_users = any(not str(part.__module__).startswith("rigid_env.") for part in parts)
         return not self.compiled or is_of_users or any(map(is_of_user, self.distributions.values()))
 
     @property
     def own_draws(self) -> tuple[str, ...]:
-        """Names that `reset` reports in its info: all draws that `effects` do not replace."""
+        """Names of the draws that `reset` reports in its info: all that `effects` do not fix."""
         taken = replaced(self.effects)
         return tuple(name for name in self.drawn if name not in taken)
 
     @property
     def option_names(self) -> tuple[str, ...]:
-        """Options of `start`."""
+        """Names of the options that `start` takes: all draws."""
         return tuple(self.drawn)
 
     def _scene(self, distributions: Mapping[str, Distribution]) -> physics.Scene:
@@ -278,7 +283,7 @@ class Starts(Declaration):
 
 
 def distributions_of(declared: Mapping[str, Any], given: Mapping[str, Any] | None) -> dict[str, Distribution]:
-    """Distributions of a task, some replaced by a user's of the same lengths."""
+    """Distributions of a task by name: the declared ones, some replaced by a user's (`given`) of the same lengths."""
     declared = require_known(declared, declared, "draws")
     given = require_known(given, tuple(declared), "draws")
     found = {}

@@ -1,4 +1,4 @@
-"""State of a task: a copy of all that decides the future of its worlds and episodes, and its file."""
+"""State of a task: a copy of everything that decides the future of its worlds and episodes, and its file format."""
 
 from __future__ import annotations
 
@@ -26,29 +26,29 @@ FILE = FileKind(
 
 @dataclass(frozen=True)
 class TaskState:
-    """Copy of all that decides the future of a task's worlds, and the settings that must agree where it is restored.
+    """Copy of everything that decides the future of a task's worlds, with the settings that restoring requires.
 
-    Accuracy, `max_episode_steps` and distributions of draws may differ: the same worlds then continue with the new
-    ones.
+    Accuracy, `max_episode_steps` and the distributions of draws may differ: the worlds then continue with those of the
+    task that restores the state.
 
     Parameters
     ----------
     task : str
         Name of the task's class.
     settings : dict of str to str, int or float
-        Settings that must be the same where it goes on: ``frame_skip``, ``dt`` and others, see
+        Settings that the restoring task must have, too: ``frame_skip``, ``dt`` and others, see
         `rigid_env.tasks.state_settings`.
     world : physics.Snapshot
-        The worlds: poses, velocities, parameters, warm starts, actuators, time.
+        Poses, velocities, parameters, warm starts, actuators and time of the worlds.
     arrays : dict of str to array
-        Rows of each world: drawn values, memory, actions, the potential and the hold of compiled tasks, disturbances,
-        observations and outcomes of the last step.
+        Arrays with a row for each world: drawn values, memory, actions, potential and hold of compiled tasks,
+        disturbances, observations and outcomes of the last step.
     held : dict of str to array
-        Values that `Task.hold` gave, of each world.
+        Values that `Task.hold` holds, with a row for each world.
     told : tuple of str
-        Physical parameters that the worlds are told of at the start of an episode.
+        Physical parameters that are written into the worlds at the start of an episode.
     generators, seeds : tuple
-        State of each world's random generator, and the seed that it began with; None before its first reset.
+        State of each world's random generator, and the seed that it began with; None before the world's first reset.
     """
 
     task: str
@@ -74,7 +74,7 @@ class TaskState:
         return self.task, f"{self.worlds} worlds", f"time={self.world.time:.6g} s"
 
     def save(self, path: str | os.PathLike) -> Path:
-        """Write the state as ``.npz`` (`load` reads it); return the path.
+        """Write the state to a ``.npz`` file, which `load` reads; return the path.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class TaskState:
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> TaskState:
-        """Read a state that `save` has written, bit for bit, without running code from the file.
+        """Read a state from a file of `save`, bit for bit, without running code from the file.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class TaskState:
         Raises
         ------
         ValueError
-            It is no state of a task, a damaged one, or one of another format than 2.
+            The file holds no state of a task, a damaged one, or one of another format than 3.
         OSError
             The file cannot be read.
         """
@@ -111,7 +111,10 @@ class TaskState:
 
 
 def _from_parts(path: str | os.PathLike, head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> TaskState:
-    """Make a state of the head and the arrays of a file; `put` finds out whether it fits a task."""
+    """Make a state from the head and the arrays of a file at `path`.
+
+    The head and the shapes are checked here; `rigid_env.tasks.restoring` checks whether the state fits a task.
+    """
     world = physics.Snapshot.read(io.BytesIO(parts.pop("world").tobytes()), path)
     held = {name.removeprefix(HELD): parts.pop(name) for name in list(parts) if name.startswith(HELD)}
     count = world.worlds
@@ -133,7 +136,7 @@ def _are_names(value: Any) -> bool:
 
 
 def _are_seeds(value: Any, count: int) -> bool:
-    """True if these are seeds: integers, or -1 or None before the first reset."""
+    """True if the value is a list of `count` seeds: integers, or -1 or None for a world before its first reset."""
     return (
         isinstance(value, list) and len(value) == count and all(each in (None, -1) or is_count(each) for each in value)
     )
@@ -148,14 +151,14 @@ def _are_generators(value: Any, count: int) -> bool:
 
 
 def _check_rows(arrays: Mapping[str, np.ndarray], count: int) -> None:
-    """Refuse an array that does not have a row for each world."""
+    """Raise a ValueError for an array that does not have `count` rows, one for each world."""
     for name, array in arrays.items():
         if array.ndim == 0 or len(array) != count:
             raise ValueError(f"{name} has shape {array.shape}; allowed is a row for each of {count} worlds")
 
 
 def _as_json(state: Mapping[str, Any] | None) -> Any:
-    """State of a generator with its large integers as text."""
+    """State of a random generator for JSON, whose large integers become text; None stays None."""
     if state is None:
         return None
     return {key: _as_json(value) if isinstance(value, Mapping) else str(value) for key, value in state.items()}

@@ -1,4 +1,4 @@
-"""Settings outside a task's state that decide its future; they must agree where a state is restored."""
+"""Settings of a task that decide its future but are not part of a state; they must agree where a state is restored."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ Setting = str | int | float
 
 
 def state_settings(task) -> dict[str, Setting]:
-    """Settings of a task, by name, as values that can be compared, shown and kept in a file.
+    """Settings of a task by name, as values that can be compared, shown and kept in a file.
 
-    The accuracy is left out on purpose: a state may continue with another one. Drawn values are in the state.
+    The accuracy is not among them, since a state may continue with another one; drawn values are in the state itself.
 
     Parameters
     ----------
@@ -30,19 +30,19 @@ def state_settings(task) -> dict[str, Setting]:
 
 
 def check_settings(task: str, ours: Mapping[str, Setting], theirs: Mapping[str, Setting]) -> None:
-    """Refuse a state with other settings than a task.
+    """Refuse a state whose settings differ from those of the task.
 
     Parameters
     ----------
     task : str
-        Its name.
-    ours, theirs : mapping
+        Name of the task, for the error.
+    ours, theirs : mapping of str to value
         Settings of the task, and of the state.
 
     Raises
     ------
     ValueError
-        Naming the setting, its value in the state, and the task's.
+        Naming the first setting that differs, its value in the state, and its value in the task.
     """
     other = other_setting(ours, theirs)
     if other is not None:

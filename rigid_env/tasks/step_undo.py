@@ -1,4 +1,4 @@
-"""Copy of a task before a control step, to restore it when a user's function raises an error."""
+"""Copy of a task before a control step, from which it is restored if a user's function raises an error."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from rigid_env.tasks.task_parts import Stepped
 
 
 class StepUndo:
-    """Arrays for a copy of all that a control step changes.
+    """Room for a copy of everything that a control step changes.
 
     Parameters
     ----------
     task : Stepped
+        Task whose arrays are copied.
     """
 
     def __init__(self, task: Stepped):
@@ -28,7 +29,7 @@ class StepUndo:
         self._generators: dict[int, dict] = {}
 
     def keep(self) -> Undo:
-        """Copy what the coming step changes; returns `undo`."""
+        """Copy everything that the coming control step changes; returns the method `undo`."""
         task = self._task
         for array, kept in self._kept:
             kept[...] = array
@@ -41,7 +42,7 @@ class StepUndo:
         return self.undo
 
     def undo(self) -> None:
-        """Restore the state at the last `keep`."""
+        """Restore the task as it was at the last call of `keep`."""
         task = self._task
         for array, kept in self._kept:
             array[...] = kept

@@ -1,4 +1,4 @@
-"""Physics steps of one control step: prepared once, taken often."""
+"""Physics steps of a control step: prepared once, so that each call is cheap."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from physics.world.report import gravest
 class Steps:
     """The `frame_skip` physics steps of a control step.
 
-    Impulses act as a force during the first of them. Commands go through the actuator of the scene, disturbances past
-    it.
+    Impulses of actions and disturbances act as forces during the first of them. Commands of the agent go through the
+    scene's actuator; disturbances do not.
 
     Parameters
     ----------
     world : physics.World
     frame_skip : int
+        Physics steps in a control step.
     has_impulses : bool
-        Actions may be impulses.
+        Whether actions contain impulses.
     has_pushes : bool
-        Disturbances may be impulses.
+        Whether there are disturbances that are impulses.
     then : callable, optional
-        What each thread does with the worlds that it has stepped; see `physics.Stepper`.
+        Work of each thread on the worlds that it has stepped; see `physics.Stepper`.
 
     Attributes
     ----------
     wrench : (worlds, bodies, 6) float64
-        To be written: command of all steps, force [N] and torque [N m].
+        Input: command during all physics steps, force [N] and torque [N m], world frame.
     kick : (worlds, bodies, 6) float64
-        To be written: command of the first step besides. The same array as `wrench` without impulses.
+        Input: further command during the first physics step. Without impulses it is the same array as `wrench`.
     advance : callable
-        Takes the steps without a disturbance.
+        Takes all physics steps, without disturbances.
     has_first : bool
-        The first step is one of its own, of which the world's report does not tell: see `note_first`.
+        Whether the first physics step is a call of its own, so that the world's report leaves it out; see `note_first`.
     """
 
     def __init__(self, world: physics.World, frame_skip: int, has_impulses: bool, has_pushes: bool = False, then=None):
@@ -50,7 +51,7 @@ class Steps:
         self.advance_disturbed(None, None)
 
     def advance_disturbed(self, load: np.ndarray | None, push: np.ndarray | None) -> None:
-        """Take the steps under an extra load, and the first one under an extra push; neither is a command.
+        """Take all physics steps under a load, and the first one also under a push, both past the actuators.
 
         Parameters
         ----------
@@ -69,10 +70,10 @@ class Steps:
             else:
                 self._run(self._last, first, both)
         finally:
-            self.wrench[...] = command  # which may be the array of the stepper
+            self.wrench[...] = command  # `_run` wrote the sum into this array, if it is the stepper's
 
     def _run(self, stepper: physics.Stepper, command: np.ndarray, load: np.ndarray | None) -> None:
-        """Call a stepper with a command, and an extra load."""
+        """Call a stepper with a command, and with a load that goes past the scene's actuator."""
         actuation = self._world.actuation
         if actuation is None:
             stepper.wrench[...] = command if load is None else command + load
@@ -83,5 +84,5 @@ class Steps:
             stepper()
 
     def note_first(self, status: np.ndarray) -> None:
-        """Write the status of the first step into `status` (worlds,) where that is OK."""
+        """Write the status of the first physics step into `status` (worlds,), where `status` is OK."""
         np.copyto(status, self._early, where=status == physics.Status.OK)

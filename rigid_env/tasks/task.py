@@ -1,4 +1,4 @@
-"""Base class of tasks: their declaration, and the batch of worlds that runs them."""
+"""Base class of tasks: a declaration, and the batch of worlds in which it runs."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ OF_PROCESS = (
     "_undo", "_functions", "_write_arguments", "_write_wrenches", "kept_arrays", "observed", "rollout_loop",
     "rollout_observers",
 )  # fmt: skip
-"""Names of attributes left out of copies: machine code, and functions of the class."""
+"""Attributes that a copy or a pickled task leaves out and makes anew: machine code, and functions of the class."""
 
 
 @dataclass(frozen=True)
@@ -48,19 +48,21 @@ class _Arguments(ControlArguments, BatchArguments):
 
 
 class Task(Starts):
-    """A batch of worlds of one scene, and the task set in them. Subclass it to set one of your own.
+    """A batch of worlds of one scene, with a task of reinforcement learning in them; subclass it to write your own.
 
-    A subclass declares the attributes below, and defines the functions that it needs of `place`, `begin`, `update`,
-    `success`, `failure`, `rewards` and `measure`. They are NumPy functions of `Worlds`, arrays with one row for each
-    world, and are called once in a control step. docs/tasks.md builds one from nothing.
+    A subclass declares the attributes below. Of the functions `place`, `begin`, `update`, `success`, `failure`,
+    `rewards` and `measure` it defines those that it needs. These are NumPy functions of `Worlds`, arrays with one row
+    for each world, and are called once in a control step. docs/tasks.md builds a task from nothing.
 
     Parameters
     ----------
     worlds : int
         Size of the batch.
     accuracy : str or physics.Accuracy
+        Name of a preset, or all settings.
     effects : sequence of physics effects
-        Added to the scene's; one of the same class replaces the scene's. What is drawn cannot be replaced.
+        Effects that are added to the scene's; one of the same class replaces the scene's. An effect must not fix a
+        parameter that is drawn.
     draws : mapping, optional
         Distributions in place of the task's own of the same names; a number is fixed, a pair (low, high) uniform.
     frame_skip : int
@@ -68,8 +70,8 @@ class Task(Starts):
     dt : float
         Physics step [s].
     dump_faults : str or Path, optional
-        Folder for the last control steps of a world whose state did not stay finite; ``rigid-env replay`` takes them
-        again. See `physics.Recorder`, which then keeps a copy of them all.
+        Folder for recordings: when a world's state is no longer finite, its last control steps are written there, and
+        ``rigid-env replay`` repeats them. `physics.Recorder` copies each control step for it.
     threads : int
         Threads that share a step.
 
@@ -78,26 +80,30 @@ class Task(Starts):
     scene : physics.Scene
         Declared by the subclass.
     actions : sequence of Wrench, Force and Impulse
-        Declared: who is acted upon and how.
+        Declared: how the numbers of an action act on which bodies.
     observation : sequence of Entry
-        Declared: `rigid_env.observe` has the usual ones.
+        Declared: `rigid_env.observe` has the usual entries.
     draws : mapping of str to Distribution, number or pair
-        Declared: what each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``, ``restitution`` and
-        ``gravity`` are given to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
+        Declared: values that each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``,
+        ``restitution`` and ``gravity`` are written into the world (``mass[1]``: of body 1 alone); the task's functions
+        use the others.
     memory : mapping of str to int
-        Declared: numbers per world that functions keep from step to step, and how many each; zeros at the start.
+        Declared: names of the numbers that functions keep from step to step, each with its count per world. They are
+        zero at the start of an episode.
     disturbances : sequence of Push and Gust
-        Declared: what happens to bodies at random times.
+        Declared: impulses and forces on bodies at random times.
     max_episode_steps : int or None
         Declared: control steps after which Gymnasium truncates an episode.
     ends_on_success : bool
-        Declared: False lets an episode go on.
+        Declared: False lets an episode continue after success.
     world : physics.World
+        All worlds of the batch.
     generators : list of numpy.random.Generator or None
-        One per world: an episode does not depend on the batch it runs in.
+        One for each world, so that an episode does not depend on the batch that it runs in.
     drawn : dict of str to (worlds,) or (worlds, k) float64
-        Values of the running episodes.
+        Drawn values of the running episodes.
     obs : (worlds, entries) float32
+        Observations after the last step.
     outcome : (worlds, 3 + infos) float64
         Reward, success, failure and the numbers of `info_names`, of the last step.
     status : (worlds,) int64
@@ -106,7 +112,7 @@ class Task(Starts):
     Raises
     ------
     ValueError
-        Naming the field, the value and what is allowed.
+        The message names the field, its value and what is allowed.
     """
 
     @takes(_Arguments)
@@ -170,17 +176,17 @@ class Task(Starts):
 
     @property
     def worlds(self) -> int:
-        """Size of the batch."""
+        """Number of worlds in the batch."""
         return self.world.worlds
 
     @property
     def drawn(self) -> dict[str, NDArray[np.float64]]:
-        """Values of the running episodes, by name."""
+        """Drawn values of the running episodes, by name: (worlds,) or (worlds, k) each."""
         return self.episodes.now
 
     @property
     def distributions(self) -> dict[str, Distribution]:
-        """Distributions of the episodes' draws, by name."""
+        """Distributions that episodes draw from, by name."""
         return self.episodes.distributions
 
     @property
@@ -190,7 +196,7 @@ class Task(Starts):
 
     @property
     def load(self) -> NDArray[np.float64]:
-        """Load (worlds, bodies, 6) float64: `wrench` plus the gusts of the last step."""
+        """Load (worlds, bodies, 6) float64 on the bodies: `wrench` plus the gusts of the last control step."""
         return self.wrench if self.disturbed is None else self.wrench + self.disturbed.load
 
     @property
@@ -200,12 +206,12 @@ class Task(Starts):
 
     @property
     def steps(self) -> NDArray[np.int64]:
-        """(worlds,) int64. Control steps since each episode began."""
+        """Control steps (worlds,) int64 since each world's episode began."""
         return self.clock - self._began
 
     @property
     def action_size(self) -> int:
-        """Numbers of an action."""
+        """Length of an action."""
         return self._table.size
 
     @property
@@ -215,36 +221,36 @@ class Task(Starts):
 
     @cached_property
     def rollout_loop(self) -> RolloutLoop:
-        """Loop of a compiled task's rollouts, made with the first rollout."""
+        """Loop that runs rollouts of a compiled task in machine code; the first rollout makes it."""
         return RolloutLoop(self.world, self.wrench, self.frame_skip, self.world.dt)
 
     @cached_property
     def rollout_observers(self) -> list[BoundCall]:
-        """Calls that observe the worlds that each thread of that loop has stepped."""
+        """Calls that observe worlds in `rollout_loop`: one for each thread, for the worlds that it has stepped."""
         return [self.observer(taken) for taken in self.rollout_loop.taken]
 
     @property
     def action_vectors(self) -> list:
-        """Forces, torques and impulses made from an action's numbers, in their order."""
+        """Forces, torques and impulses that an action sets, in the order of its numbers."""
         return self._table.vectors
 
     def lines(self, world: int) -> tuple[str, ...]:
-        """Lines of text for pictures of one world: the numbers that the task measures."""
+        """Lines of text beside pictures of one world: the measures of the task after the last step."""
         values = self.outcome[world, col.INFO :].tolist()
         return tuple(f"{name} {value:.2f}" for name, value in zip(self.measures, values))
 
     def inv_mass(self, world: int, body: int) -> float:
-        """Inverse mass of one body [1/kg]."""
+        """Inverse mass of one body in one world [1/kg]."""
         return float(self.world.params[world * self.world.body_count + body, at.INV_MASS])
 
     @property
     def action_text(self) -> str:
-        """Vectors of an action, in words."""
+        """Description in words of the forces, torques and impulses that an action sets."""
         return ", ".join(vector.text for vector in self._table.vectors)
 
     @property
     def agents(self) -> dict[str, np.ndarray]:
-        """Numbers of an action that belong to each agent."""
+        """Indices of the action's numbers that each agent chooses, by the agent's name."""
         return self._table.agents
 
     # --- control steps ------------------------------------------------------------------------------------
@@ -260,13 +266,13 @@ class Task(Starts):
         Raises
         ------
         ValueError
-            Actions of the wrong shape or not finite, or a function of the task that gives what it may not. Nothing has
-            changed then.
+            Actions of the wrong shape or not finite, or a wrong result of a function of the task. Nothing has changed
+            then.
         """
         self.apply(shaped(actions, self.action.shape, "actions"))
 
     def apply(self, actions: np.ndarray) -> None:
-        """Take a `step` with an array of the right shape; the axis of a single world may be missing."""
+        """Do the work of `step` for an array of the right shape; for a single world, its axis may be missing."""
         if actions.dtype.kind not in "fiub":
             raise ValueError(f"actions is {reprlib.repr(actions.tolist())}; allowed are numbers")
         if self._functions is not None:
@@ -283,16 +289,16 @@ class Task(Starts):
         return StepUndo(self) if self.may_fail else None
 
     def undo_step(self) -> None:
-        """Restore the state before the last control step, after a start that raised an error."""
+        """Restore the state before the last control step, after the start of a new episode has raised an error."""
         if self._undo is not None:
             self._undo.undo()
 
     def not_finite(self, world: int) -> ValueError:
-        """Error for an action in `given` that is not finite, with its world."""
+        """Make the error for an action of a world that is not finite."""
         return ValueError(f"action of world {world} is {self.given[world].tolist()}; allowed are finite numbers")
 
     def act(self) -> None:
-        """Advance the worlds by one control step, under the actions in `given`."""
+        """Advance the worlds by one control step under the actions in the array `given`, without observing them."""
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
             raise self.not_finite(bad)
@@ -307,7 +313,7 @@ class Task(Starts):
         self.clock += 1
 
     def _prepare(self) -> None:
-        """Bind machine code and views of arrays, which belong to this process."""
+        """Make what belongs to this process: machine code bound to arrays, and the dict of arrays for states."""
         table, advance = self._table, self._advance
         self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick
@@ -324,31 +330,31 @@ class Task(Starts):
         }  # fmt: skip
 
     def state_arrays(self) -> dict[str, np.ndarray]:
-        """Arrays that decide the future of episodes, apart from the world's, by name; each has a row for each world."""
+        """Arrays of the task, without those of the world, that decide the future of episodes; a row per world."""
         return {**self.kept_arrays, "steps": self.steps}
 
     @cached_property
     def settings_of_state(self) -> dict[str, Any]:
-        """Settings that must agree where a state is restored, by name."""
+        """Settings that a state and the task that restores it must share, by name."""
         return state_settings(self)
 
     def own_settings(self) -> dict[str, Any]:
-        """Settings of a kind of tasks that decide the future of episodes, by name; a state needs equal ones.
+        """Further settings that a state and the task that restores it must share, by name; subclasses override it.
 
-        They need not include scene, actions and time.
+        Scene, actions and time steps are compared anyway.
         """
         return {}
 
     def own_arrays(self) -> dict[str, np.ndarray]:
-        """Further arrays of a kind of tasks that a step renews, by name, with a row for each world."""
+        """Further arrays that a control step changes, by name, a row for each world; subclasses override it."""
         return {}
 
     def set_outcome(self, outcome: np.ndarray) -> None:
-        """Take an array for outcomes, once the number of their numbers is known."""
+        """Replace the array `outcome`, once the first call of the task's functions has shown its number of columns."""
         self.outcome = self.kept_arrays["outcome"] = outcome
 
     def adopt(self, rows: np.ndarray, steps: np.ndarray) -> None:
-        """Take over the number of control steps (n,) of the episodes in worlds `rows`."""
+        """Set the control steps (n,) that the episodes in worlds `rows` have taken, after a state was restored."""
         self._began[rows] = self.clock - steps
 
     def __getstate__(self):
@@ -365,19 +371,23 @@ class Task(Starts):
         self._undo = self._keeper()
 
     def observer(self, taken: np.ndarray) -> BoundCall:
-        """Return the kernel that observes the worlds of a list, such as a thread has stepped."""
+        """Return a prepared call of the task's kernel, which observes the worlds listed in `taken`.
+
+        `taken` is a list of worlds as in `physics.kernels.parallel.work_stealing`, such as those that a thread has
+        stepped.
+        """
         arguments = (taken, self.world.state, self.record, self.world.walls, self.action, self.obs, self.outcome)
         compiled_task: Any = self.compiled
         return bound_alike(None, compiled_task, *arguments)
 
 
 def shaped(given: ArrayLike, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Return actions as an array of this shape.
+    """Convert actions to an array, and check its shape.
 
     Raises
     ------
     ValueError
-        Parts of different lengths, or another shape; tells the argument's `name`.
+        Parts of different lengths, or a shape other than `shape`; the message contains the argument's `name`.
     """
     try:
         array = np.asarray(given)

@@ -1,6 +1,7 @@
-"""Parts of a task that its helpers may touch.
+"""Protocols: the parts of a `Task` that each of its helper classes may use.
 
-A `Task` makes its helpers and hands them itself. Each of them sees the part that stands here for it, and no more.
+A `Task` makes its helpers and passes itself to them. The type of their argument is a protocol of this module, so a
+helper can use only the attributes listed here.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Batched(Protocol):
-    """Batch of worlds, and where their episodes are."""
+    """Batch of worlds with the bodies' weights and the steps of the running episodes."""
 
     world: physics.World
     weights: np.ndarray
@@ -36,7 +37,7 @@ class Batched(Protocol):
 
 
 class Disturbed(Batched, Protocol):
-    """Part that `Disturbances` read; they draw from the generators."""
+    """Part of a task that `Disturbances` use; they draw from its generators."""
 
     generators: list[Any]  # numpy.random.Generator; None before the first episode
 
@@ -44,7 +45,7 @@ class Disturbed(Batched, Protocol):
 
 
 class Watched(Batched, Protocol):
-    """Part that `Worlds` show to a task's functions."""
+    """Part of a task that `Worlds` show to the task's functions."""
 
     action: np.ndarray
     previous_action: np.ndarray
@@ -58,7 +59,7 @@ class Watched(Batched, Protocol):
 
 
 class Stepped(Watched, Protocol):
-    """Part that a control step changes, and `StepUndo` restores."""
+    """Part of a task that a control step changes and that `StepUndo` restores."""
 
     clock: int
     generators: list[Any]  # numpy.random.Generator; None before the first episode
@@ -72,7 +73,7 @@ class Stepped(Watched, Protocol):
 
 
 class Called(Stepped, Protocol):
-    """Part that `Functions` call and write: all functions of the user's, and where their results go."""
+    """Part of a task that `Functions` use: the task's NumPy functions, and the arrays for their results."""
 
     observed: Observation
     episodes: Draws

@@ -1,4 +1,4 @@
-"""Worlds as a task's functions see them: arrays with one row for each."""
+"""Read access to the worlds of a task for its NumPy functions: arrays with one row for each world."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ def read_only(array: np.ndarray) -> np.ndarray:
 
 
 class Worlds:
-    """Worlds of a task: all of them in a step, or those whose episodes begin.
+    """Worlds that a task's functions read: all worlds in a control step, or those in which an episode begins.
 
-    Arrays for all worlds are views of the running simulation: copy them to keep them. Slow quantities are computed when
-    they are first read, once in a step.
+    Arrays for all worlds are views of the running simulation: copy them to keep them. Quantities that take long to
+    compute are computed when they are first read, once in a step.
 
     Attributes
     ----------
     indices : (n,) int64
-        Of the worlds in their batch.
+        Indices of these worlds in their batch.
     pos, quat, linvel, angvel : (n, bodies, 3|4|3|3) float64
         World frame; [m], unit quaternions, [m/s], [rad/s].
     drawn : dict of str to (n,) or (n, k) float64
-        Values of the episodes, by their names in the task's `draws`.
+        Drawn values of the episodes, by their names in the task's `draws`.
     memory : dict of str to (n,) or (n, k) float64
-        Numbers that the task keeps from step to step, by their names in its `memory`: to be written in place.
+        Numbers that the task keeps from step to step, by their names in its `memory`; functions may write them.
     action, previous_action : (n, entries) float64
-        The last two actions, clipped to ±1; zeros at the start of an episode.
+        The last action and the one before it, clipped to ±1; zeros at the start of an episode.
     measured : dict of str to (n,) array
-        Numbers that the task's `measure` gave, before its other functions are called.
+        Numbers that the task's `measure` returned, which is called before the other functions.
     success, failure : (n,) bool
-        Flags that the task's functions of these names gave; False before they did.
+        Flags that the task's functions `success` and `failure` returned; False before they are called.
     """
 
     def __init__(self, task: Watched, indices: np.ndarray | None = None):
@@ -60,7 +60,7 @@ class Worlds:
         self.renew()
 
     def renew(self) -> None:
-        """Clear cached values, since the worlds have moved."""
+        """Discard cached values after the worlds have moved."""
         self.success = self.failure = np.zeros(len(self.indices), dtype=np.bool_)
         self.measured: Mapping[str, np.ndarray] = {}
         self._found: dict[str, np.ndarray] = {}
@@ -73,33 +73,36 @@ class Worlds:
 
     @property
     def steps(self) -> np.ndarray:
-        """(n,) int64. Control steps since the episode began."""
+        """Control steps (n,) int64 since the episode began."""
         return self._take(self._task.steps)
 
     @property
     def time(self) -> np.ndarray:
-        """(n,) float64. Time since the episode began [s]."""
+        """Time (n,) float64 since the episode began [s]."""
         return self.steps * self._task.control_dt
 
     @property
     def rotation(self) -> np.ndarray:
-        """(n, bodies, 3, 3) float64. Rotation matrices, body to world."""
+        """Rotation matrices (n, bodies, 3, 3) float64, body to world."""
         return self._worked_out("rotation", write_rotations, (self._task.world.body_count, 3, 3))
 
     @property
     def wall_gaps(self) -> np.ndarray:
-        """(n, bodies, walls) float64. Distance between each body and each wall, negative inside [m]."""
+        """Gaps (n, bodies, walls) float64 between each body and each wall [m]; negative where they overlap."""
         world = self._task.world
         return self._worked_out("wall_gaps", write_wall_gaps, (world.body_count, len(world.walls)))
 
     @property
     def contact_force(self) -> np.ndarray:
-        """(n, bodies, 3) float64. Sum of the contact forces on each body in the last physics step, world frame [N]."""
+        """Sums (n, bodies, 3) float64 of the contact forces on each body in the last physics step, world frame [N]."""
         return self._contact_sums()[0]
 
     @property
     def contact_impulse(self) -> np.ndarray:
-        """(n, bodies, 3) float64. Sum of the contact impulses of the last resting stage, world frame [N s]."""
+        """Sums (n, bodies, 3) float64 of the contact impulses on each body in the last resting stage [N s].
+
+        World frame.
+        """
         return self._contact_sums()[1]
 
     def _contact_sums(self) -> tuple[np.ndarray, np.ndarray]:
@@ -113,7 +116,7 @@ class Worlds:
         return self._contacts_of()
 
     def contacts_of(self, body: int, count: int) -> Contacts:
-        """Contacts of one body, always as the first body: the `count` with the largest forces."""
+        """Contacts of one body, the `count` with the largest forces; this body is the first of each pair."""
         return self._contacts_of(count, body)
 
     def _contacts_of(self, *chosen: int) -> Contacts:
@@ -123,16 +126,19 @@ class Worlds:
 
     @property
     def impact_impulse(self) -> np.ndarray:
-        """(n, bodies, 3) float64. Sum of the impulses of impacts on each body in the control step [N s]."""
+        """Sums (n, bodies, 3) float64 of the impulses of impacts on each body in the control step, world frame.
+
+        The unit is N s.
+        """
         return self._impacts_of(0).total
 
     @property
     def impacts(self) -> Impacts:
-        """Impacts of the last control step, a row for each pair; see `physics.Impacts`."""
+        """Impacts of the last control step, a row for each pair that collided; see `physics.Impacts`."""
         return self._impacts_of()
 
     def impacts_of(self, body: int, count: int) -> Impacts:
-        """Impacts of one body, always as the first body: the `count` pairs with the largest impulses."""
+        """Impacts of one body, the `count` pairs with the largest impulses; this body is the first of each pair."""
         return self._impacts_of(count, body)
 
     def _impacts_of(self, *chosen: int) -> Impacts:
@@ -145,12 +151,12 @@ class Worlds:
 
     @property
     def wrench(self) -> np.ndarray:
-        """(n, bodies, 6) float64. Wrench of the last action alone: force [N] and torque [N m], world frame."""
+        """Wrenches (n, bodies, 6) float64 of the last action alone: force [N] and torque [N m], world frame."""
         return self._take(self._task.wrench)
 
     @property
     def weight(self) -> np.ndarray:
-        """(n, bodies) float64. Mass times gravity (9.81 m/s² where there is none) [N]."""
+        """Weights (n, bodies) float64: mass times gravity (9.81 m/s² where there is none) [N]."""
         return self._take(self._task.weights)
 
     def _worked_out(self, name: str, write, shape: tuple[int, ...]) -> np.ndarray:

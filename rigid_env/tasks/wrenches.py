@@ -1,4 +1,4 @@
-"""Compiled conversion of an action's numbers to the wrenches on bodies."""
+"""Kernels that convert the numbers of an action to the wrenches on bodies."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ TORQUE, IMPULSE = 1, 2  # kinds, as in `rigid_env.tasks.actions`
 
 @inlined
 def clip(x, low, high):
-    """x limited to [low, high]."""
+    """Limit x to the interval from low to high."""
     return min(max(x, low), high)
 
 
 @inlined
 def _number(actions, i, k):
-    """Number k of an action, clipped to ±1; 0 for an axis without one."""
+    """Number `k` of world i's action, clipped to ±1; 0 if k is -1, for an axis without a number."""
     return clip(actions[i, k], -1.0, 1.0) if k >= 0 else 0.0
 
 
 @kernel
 def write_wrench(i, actions, table, points, limits, state, wrench, kick):
-    """Write the wrenches of world i from row i of `actions`; arguments as of `write_wrenches`."""
+    """Write the wrenches on all bodies of world i from row i of `actions`; arguments as of `write_wrenches`."""
     bodies = wrench.shape[1]
     for b in range(bodies):
         for k in range(6):
@@ -59,25 +59,29 @@ def write_wrench(i, actions, table, points, limits, state, wrench, kick):
 
 @entry_kernel
 def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
-    """Wrenches from actions: numbers clipped to ±1 each, then each vector to its ball of radius 1.
+    """Convert actions to wrenches: clip numbers to ±1, shorten each vector to length 1, multiply it by its limit.
 
     Parameters
     ----------
     given : (worlds, numbers) float64
+        Actions.
     actions : (worlds, numbers) float64, out
-        Those given.
+        Copy of `given`.
     table, points : (vectors, 6) int64, (vectors, 3) float64
         As of `actions.ActionTable`.
     limits : (worlds, vectors) float64
-        Longest vectors [N, N m].
+        Largest lengths of the vectors [N, N m].
     state : (worlds * bodies, STATE_SIZE) float64
+        State of the bodies, whose attitudes turn vectors from body frames.
     wrench, kick : (worlds, bodies, 6) float64, out
-        World frame; of forces and torques, and of impulses as forces. The same array where there are no impulses.
+        World frame: wrenches of forces and torques, and wrenches of impulses, which are given as forces. The same array
+        if there are no impulses.
 
     Returns
     -------
     int
-        Index of the first world whose action is not finite, else -1; the outputs are written in the second case only.
+        -1 after the outputs are written. Else the index of the first world whose action is not finite; then nothing is
+        written.
     """
     for i in range(given.shape[0]):
         for k in range(given.shape[1]):
@@ -92,14 +96,16 @@ def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
 
 @kernel
 def begin_control(moment, actions, action, table, points, limits, state, wrench, kick):
-    """Take the actions of a step of a rollout, and hold their wrenches.
+    """Take the actions of one control step of a rollout, and write their wrenches.
 
     Parameters
     ----------
     moment : (MOMENT_SIZE,) int64
-        Of `physics.world.rollout_loop`.
+        First and last world and the step, see `physics.world.rollout_loop`.
     actions : (worlds, length, numbers) float64
+        Actions of all control steps.
     action : (worlds, numbers) float64, out
+        Actions of this control step.
     table, points, limits, state, wrench, kick
         As of `write_wrenches`.
     """

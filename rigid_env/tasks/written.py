@@ -1,4 +1,4 @@
-"""Read the documentation that a class's docstring writes out by hand, by Gymnasium's sections."""
+"""Read the sections that a class's docstring writes out by hand, under Gymnasium's titles."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ SENTENCE_END = re.compile(r"(?<=[.:])\s+(?=[A-Z`0-9])")
 
 @dataclass(frozen=True)
 class Part:
-    """Section of a docstring.
+    """Section of a docstring: paragraphs and one table.
 
     Attributes
     ----------
     before, after : tuple of str
-        Paragraphs around its table; all are `before` where there is none.
+        Paragraphs before and after the table; without a table all of them are in `before`.
     rows : tuple of tuple of str
-        Of the table, without its head.
+        Cells of the table, row by row, without its head.
     """
 
     before: tuple[str, ...] = ()
@@ -28,19 +28,19 @@ class Part:
 
     @property
     def text(self) -> tuple[str, ...]:
-        """All paragraphs as one text."""
+        """All paragraphs, those before the table first."""
         return (*self.before, *self.after)
 
 
 def written_parts(documented: type) -> dict[str, Part]:
-    """Sections of a class's docstring by title; none where it has no headings."""
+    """Sections of a class's docstring by title; empty if the docstring has no headings."""
     doc = inspect.cleandoc(documented.__doc__ or "")
     _, *rest = re.split(r"^## (.+)$", doc, flags=re.MULTILINE)
     return {title: _part(body) for title, body in zip(rest[::2], rest[1::2])}
 
 
 def sentences(paragraphs: tuple[str, ...], is_kept: Callable[[str], bool]) -> tuple[str, ...]:
-    """Paragraphs without rejected sentences, and without paragraphs that are then empty."""
+    """Paragraphs without the sentences for which `is_kept` returns False, and without paragraphs that become empty."""
     found = (" ".join(filter(is_kept, SENTENCE_END.split(text))) for text in paragraphs)
     return tuple(filter(None, found))
 

@@ -1,4 +1,4 @@
-"""Print in a terminal, a pipe or a file: one console, and one kind of table."""
+"""Output of programs to a terminal, a pipe or a file: a console, labelled lines, progress bars and tables."""
 
 from rigid_env.terminal.console import make_console, progress_bar, say
 from rigid_env.terminal.program import run_program

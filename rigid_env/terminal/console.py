@@ -1,4 +1,4 @@
-"""Console and progress bars of all programs."""
+"""Console, labelled lines and progress bars, the same for all programs."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
-# Width in a pipe or a file, where nothing sets one: no line is longer, so that none is broken [characters].
+# Width of output to a pipe or a file, larger than any line, so that no line is broken [characters].
 UNBROKEN = 10_000
-LABEL_WIDTH = 11  # of the labels that `say` prints [characters]
+LABEL_WIDTH = 11  # width of the labels that `say` prints [characters]
 
 
 def make_console(is_error: bool = False) -> Console:
     """Make a console on standard output, or on standard error, that prints text as it is.
 
-    Square brackets and colons mean nothing to it: a unit such as ``[s]`` is printed. A terminal sets the width, or the
-    variable ``COLUMNS``. Without either, in a pipe or a file, no line is broken.
+    Square brackets and colons have no special meaning: a unit such as ``[s]`` is printed. The terminal or the variable
+    ``COLUMNS`` sets the width. Without either, in a pipe or a file, no line is broken.
     """
     console = Console(markup=False, emoji=False, highlight=False, stderr=is_error)
     if console.is_terminal or os.environ.get("COLUMNS", "").isdigit():
@@ -33,7 +33,8 @@ def progress_bar(console: Console, has_thread: bool = True) -> Progress:
     ----------
     console : Console
     has_thread : bool
-        Whether a thread redraws it. One would disturb a measurement: without it, update with ``refresh=True``.
+        Whether a thread redraws it. A thread would disturb a measurement; without it, call `update` with
+        ``refresh=True``.
     """
     description = TextColumn("{task.description}", markup=False)
     columns = (description, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
@@ -42,7 +43,7 @@ def progress_bar(console: Console, has_thread: bool = True) -> Progress:
 
 
 def say(console: Console, label: str, text: str | Text) -> None:
-    """Print a line with a label; in a narrow terminal, further lines begin under its text."""
+    """Print a line with a label on the left; where a terminal breaks the line, the rest is aligned with the text."""
     line = Table.grid(padding=(0, 1, 0, 0))
     line.add_column(width=LABEL_WIDTH, no_wrap=True)
     line.add_column(overflow="fold")

@@ -1,4 +1,4 @@
-"""A program of one command."""
+"""Program with one command, made from a function."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import typer
 
 
 def run_program(main: Callable) -> None:
-    """Run a function as a program; its parameters are the command line, its docstring the help.
+    """Run a function as a program: its parameters become the options of the command line, its docstring the help text.
 
-    Without markup, as in the command line `rigid-env`: square brackets are printed, and an error is one line.
+    As in the command line `rigid-env` there is no markup: square brackets are printed, and an error is one line.
     """
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.command()(main)

@@ -1,7 +1,7 @@
-"""Tables that stay readable at any width.
+"""Tables that stay readable at any width of the terminal.
 
-A number is never broken and never cut. Where a table is too wide, columns that may go below another one do so; where
-it still is, every row becomes a list of "name  value" lines.
+A number is never broken or cut. If a table is too wide, columns with `Column.under` move below other columns. If it is
+still too wide, every row becomes a list of lines "name  value".
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table as RichTable
 from rich.text import Text
 
-READABLE = 16  # narrower than this no text is broken, unless all of it is shorter [characters]
-GAP = 2  # between columns [characters]
+READABLE = 16  # least width of a column whose text is broken into lines [characters]
+GAP = 2  # space between columns [characters]
 
 Cell = str | Text
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a `Table`.
+    """Column of a `Table`: its header, and how its cells may be laid out.
 
     Attributes
     ----------
     name : str
-        Its header. Line breaks are kept.
+        Header. Line breaks in it are kept.
     is_number : bool
-        At the right, and never broken.
+        True: cells are aligned right, and never broken.
     is_whole : bool
-        Never broken.
+        True: cells are never broken.
     under : str, optional
-        Name of the column below whose cells this one goes where the table would be too wide.
+        Name of another column; in a table that is too wide, the cells of this column go below those of the other one.
     """
 
     name: str
@@ -43,24 +43,24 @@ class Column:
 
     @property
     def may_break(self) -> bool:
-        """True if the column's text may continue in the next line."""
+        """True if a cell of the column may be broken into several lines."""
         return not (self.is_number or self.is_whole)
 
 
 def number_columns(*names: str) -> list[Column]:
-    """Columns of numbers with these names."""
+    """Make columns of numbers with these names."""
     return [Column(name, is_number=True) for name in names]
 
 
 class Table:
-    """Rows of cells under named columns, laid out for the console that prints it.
+    """Rows of cells under named columns, laid out for the width of the console that prints it.
 
     Parameters
     ----------
     columns : sequence of Column or str
         A name alone is a column of text.
     title, caption : str
-        Lines above and below; "" for none.
+        Lines above and below the table; "": none.
     """
 
     def __init__(self, columns: Sequence[Column | str], title: str = "", caption: str = ""):
@@ -74,12 +74,12 @@ class Table:
         return len(self.rows)
 
     def add_row(self, *cells: Cell, style: str = "") -> None:
-        """Add a row: a cell for each column, as plain text or as styled `rich.text.Text`.
+        """Add a row with one cell for each column, as plain text or as styled `rich.text.Text`.
 
         Raises
         ------
         ValueError
-            Another number of cells than of columns.
+            The number of cells is not the number of columns.
         """
         if len(cells) != len(self.columns):
             raise ValueError(f"cells are {len(cells)}; allowed are {len(self.columns)}, one for each column")
@@ -89,7 +89,7 @@ class Table:
         self.rows.append(row)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """Print title, rows and caption in the widest layout that fits."""
+        """Yield title, rows and caption for rich, in the widest layout that fits."""
         if self.title:
             yield Text(self.title, style="italic")
         for columns, rows in ((self.columns, self.rows), _stacked(self.columns, self.rows)):
@@ -104,7 +104,7 @@ class Table:
 
 
 def _widths(columns: Sequence[Column], rows: Sequence[Sequence[Text]], available: int) -> list[int] | None:
-    """Widths of the columns, or None where unbreakable text would be broken."""
+    """Widths of the columns for a line of `available` characters, or None if a number or a word would be broken."""
     naturals = [max(map(_line_width, texts)) for texts in _by_column(columns, rows)]
     widths = [
         max(_word_width(texts), min(natural, READABLE)) if column.may_break else natural
@@ -113,7 +113,7 @@ def _widths(columns: Sequence[Column], rows: Sequence[Sequence[Text]], available
     spare = available - sum(widths) - GAP * (len(columns) - 1)
     if spare < 0:
         return None
-    for _ in range(min(spare, sum(naturals) - sum(widths))):  # to the column that has the most lines
+    for _ in range(min(spare, sum(naturals) - sum(widths))):  # widen the column with the most lines
         k = max(range(len(widths)), key=lambda k: naturals[k] / max(widths[k], 1))
         widths[k] += 1
     return widths
@@ -132,7 +132,7 @@ def _line_width(text: Text) -> int:
 
 
 def _stacked(columns: Sequence[Column], rows: Sequence[Sequence[Text]]) -> tuple[list[Column], list[list[Text]]]:
-    """Table in which columns with an `under` become further lines of that column."""
+    """Columns and rows after each column with an `under` has become further lines of the other column."""
     kept = [k for k, column in enumerate(columns) if column.under is None]
     names = [column.name for column in columns]
 
@@ -159,7 +159,7 @@ def _grid(columns: Sequence[Column], rows: Sequence[Sequence[Text]], widths: Seq
 
 
 def _listed(columns: Sequence[Column], rows: Iterable[Sequence[Text]]) -> Iterator[RichTable | Text]:
-    """Lines of the table, one for each cell, with its column's name before it."""
+    """Yield the rows as lists of lines "name  value", one line for each cell."""
     names = [Text(" ".join(column.name.split()), style="bold") for column in columns]
     for row in rows:
         lines = RichTable.grid(padding=(0, GAP, 0, 0))

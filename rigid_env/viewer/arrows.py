@@ -1,4 +1,4 @@
-"""Arrows, lines and springs on the stage: nodes that come with their first line and are hidden after the last."""
+"""Arrows, line segments and coils of springs in viser's scene."""
 
 from __future__ import annotations
 
@@ -8,30 +8,31 @@ from rigid_env.rendering.geometry import plane_axes
 from rigid_env.viewer.scenery import Placement, vivid
 
 SHAFT, HEAD, HEAD_LENGTH = 0.013, 0.036, 0.11
-"""Radii and length of an arrow, in units of the largest body."""
+"""Radii of an arrow's shaft and head, and length of its head, in extents of the largest body."""
 
 SHORTEST = 0.6
-"""Shortest arrow drawn, in lengths of a head."""
+"""Shortest arrow that is drawn, in lengths of an arrow's head."""
 
 LONGEST = 1.6
-"""Longest arrow drawn, in units of the largest body: the force of an impact would reach out of every room."""
+"""Longest arrow that is drawn, in extents of the largest body; the force of an impact is cut to this length."""
 
 LINE = 0.011
-"""Width of a line, in units of the largest body."""
+"""Width of a line, in extents of the largest body."""
 
 COILS, COIL_POINTS, COIL_RADIUS = 9, 12, 0.03
-"""Turns of a spring, points of each turn, and its radius in units of the largest body."""
+"""Turns of a spring's coil, points of each turn, and radius of the coil in extents of the largest body."""
 
 
 class Nodes:
-    """Nodes of viser's scene that come with the first picture of them, and can be hidden.
+    """Base of objects that own nodes of viser's scene, which are added by the first drawing and can be hidden.
 
     Parameters
     ----------
     scene : viser.SceneApi
     placement : Placement
+        Scale and origin of the drawing.
     name : str, optional
-        Of the node, or of that above all; a class may have one.
+        Name of the node, or of the parent of several nodes; by default the class attribute `name`.
     """
 
     name = ""
@@ -41,24 +42,24 @@ class Nodes:
         self._nodes: list = []
 
     def hide(self) -> None:
-        """Draw nothing until the next `show`."""
+        """Make the nodes invisible until they are drawn again."""
         for node in self._nodes:
             node.visible = False
 
     def _move(self, **values) -> None:
-        """Give all nodes other values, and show them."""
+        """Set attributes of all nodes to new values, and make the nodes visible."""
         for node in self._nodes:
             for name, value in {**values, "visible": True}.items():
                 setattr(node, name, value)
 
 
 class Arrows(Nodes):
-    """Arrows of one node.
+    """Arrows in one node of viser's scene.
 
     Attributes
     ----------
     unit : float
-        Length that arrow heads and limits of lengths are multiples of [m]: at first the extent of the largest body.
+        Length that scales arrow heads and the shortest and longest arrow [m]; at first the extent of the largest body.
     """
 
     def __init__(self, scene, placement: Placement, name: str = ""):
@@ -66,7 +67,10 @@ class Arrows(Nodes):
         self.unit = placement.unit
 
     def draw(self, starts, vectors, colours) -> None:
-        """Draw arrows from `starts` (n, 3) [m], as long as `vectors` (n, 3) [m]; one colour, or (n, 3)."""
+        """Draw arrows from points `starts` (n, 3) along `vectors` (n, 3), as long as the vectors; world frame [m].
+
+        `colours` is one RGB colour for all, or (n, 3).
+        """
         starts, vectors = (np.asarray(each, dtype=float).reshape(-1, 3) for each in (starts, vectors))
         unit = self.unit
         lengths = np.sqrt(np.sum(vectors * vectors, axis=1))
@@ -87,12 +91,12 @@ class Arrows(Nodes):
 
 
 class Lines(Nodes):
-    """Line segments of one colour, in one node."""
+    """Line segments of one colour in one node of viser's scene."""
 
     colour = (0, 0, 0)
 
     def draw(self, segments) -> None:
-        """Draw segments (n, 2, 3) [m]."""
+        """Draw line segments (n, 2, 3), world frame [m]."""
         if len(segments) == 0:
             self.hide()
             return
@@ -105,13 +109,13 @@ class Lines(Nodes):
 
 
 def path(points) -> np.ndarray:
-    """Segments (n - 1, 2, 3) through points (n, 3)."""
+    """Line segments (n - 1, 2, 3) that join points (n, 3) in their order."""
     points = np.asarray(points, dtype=float)
     return np.stack([points[:-1], points[1:]], axis=1)
 
 
 def spring(start, end, unit: float) -> np.ndarray:
-    """Segments of a coil between two points (3,) [m]; `unit` is the extent of the largest body [m]."""
+    """Line segments (n, 2, 3) of a coil between two points (3,) [m]; `unit` is the extent of the largest body [m]."""
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     along = end - start
     length = float(np.linalg.norm(along))

@@ -1,4 +1,4 @@
-"""Bodies on the stage: those of one shape are one batch, so that a frame is a few arrays, however many bodies."""
+"""Drawing of bodies with viser: bodies of one shape share a node, so a picture takes few messages for many bodies."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rigid_env.viewer.scenery import Placement, vivid
 from rigid_env.viewer.shapes import Part, parts, shape_key
 
 ASLEEP = (176, 182, 192)
-"""Colour that sleeping bodies fade to."""
+"""RGB colour that the colour of a sleeping body is mixed with."""
 
 ASLEEP_SHARE = 0.72
-"""Part of the way there."""
+"""Share of `ASLEEP` in the colour of a sleeping body."""
 
 GHOST_OPACITY = 0.32
 
@@ -31,16 +31,17 @@ class _Batch:
 
 
 class Bodies:
-    """Solid bodies, or their ghosts.
+    """Solid bodies in viser's scene, or translucent ones for the ghost.
 
     Parameters
     ----------
     scene : viser.SceneApi
     root : str
-        Name of the node that holds them.
+        Name of the parent node.
     placement : Placement
+        Scale and origin of the drawing.
     is_ghost : bool
-        Translucent, without rims and shadows.
+        True draws translucent bodies without rims and shadows.
     added : callable, optional
         Called with each new node and the indices of the bodies in it.
     """
@@ -53,7 +54,7 @@ class Bodies:
         self._keys, self._batches = None, []
 
     def show(self, frame: Frame, is_asleep=None) -> None:
-        """Move the bodies to where they are in a `Frame`; sleeping ones, (bodies,) bool, are paler."""
+        """Move the bodies to their poses in a `Frame`; sleeping bodies, flagged in `is_asleep` (bodies,), are paler."""
         bodies = frame.bodies
         keys = [shape_key(body) for body in bodies]
         count = len(bodies)
@@ -72,7 +73,7 @@ class Bodies:
             self._move(batch, *drawn, colours)
 
     def clear(self) -> None:
-        """Take all bodies away."""
+        """Remove all bodies from viser's scene."""
         for batch in self._batches:
             for _, node in batch.nodes:
                 node.remove()
@@ -100,7 +101,7 @@ class Bodies:
         self._keys = keys
 
     def _move(self, batch: _Batch, pos, size, quat, colours) -> None:
-        """Send the arrays that have changed; viser compares them with those it has."""
+        """Set the poses, sizes and colours of one batch; viser sends only arrays that have changed."""
         pos, quat, colours = pos[batch.members], quat[batch.members], colours[batch.members]
         sizes = self._sizes(batch, size)
         for part, node in batch.nodes:
@@ -108,12 +109,12 @@ class Bodies:
             node.batched_colors = _shade(colours, part)
 
     def _sizes(self, batch: _Batch, size: np.ndarray) -> np.ndarray:
-        """Factors (members, 3) by which the shape is stretched."""
+        """Factors (members, 3) that stretch the shape of a batch along its axes."""
         if batch.is_hull:
             return np.full((len(batch.members), 3), self._placement.scale, dtype=np.float32)
         return size[batch.members]
 
 
 def _shade(colours: np.ndarray, part: Part) -> np.ndarray:
-    """Colours (n, 3) uint8 of a part of bodies."""
+    """Colours (n, 3) uint8 of one part of n bodies, from the colours of the bodies."""
     return vivid(colours + part.lightening * (np.array(palette.HALO) - colours))

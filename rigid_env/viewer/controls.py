@@ -1,4 +1,4 @@
-"""Controls by which a user acts in a run: hand, sliders, accuracy and ghost; kernels compile in the background."""
+"""Controls of a viewer's session: the user's hand, sliders, accuracy and ghost; kernels compile in the background."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from rigid_env.viewer.interface import Can, Subject
 from rigid_env.viewer.run import Run
 
 START, GHOST = "the scene", "the ghost"
-"""Names of what compiles besides accuracies."""
+"""Names of the background jobs that compile kernels for the start and for the ghost; other jobs have names of
+accuracies."""
 
 
 class Background:
-    """One call in a thread of its own, which ends with the program.
+    """One function call in a thread of its own; the thread ends with the program at the latest.
 
     Parameters
     ----------
     name : str
-        Of the thread.
+        Name of the thread.
     work : callable
-        Takes nothing.
+        Function without arguments.
 
     Attributes
     ----------
     error : BaseException or None
-        The one that it ended in.
+        Exception that ended the call, if any.
     """
 
     def __init__(self, name: str, work: Callable[[], None]):
@@ -41,28 +42,28 @@ class Background:
     def _run(self) -> None:
         try:
             self._work()
-        except BaseException as error:  # told by whoever looks
+        except BaseException as error:  # `Controls._poll` reports it
             self.error = error
 
     @property
     def is_done(self) -> bool:
-        """True once the call has ended, in an error, too."""
+        """True once the call has ended, also by an exception."""
         return not self._thread.is_alive()
 
     def join(self) -> None:
-        """Wait for its end."""
+        """Wait until the call has ended."""
         self._thread.join()
 
 
 class Controls:
-    """Part of `session.Session` by which a user acts in the run of its subject."""
+    """Base of `session.Session`: methods by which a user changes the run of a subject."""
 
     def __init__(self, subject: Subject):
         self.subject, self.is_playing = subject, False
         self._run, self._note = Run(subject), ""
-        self._sliders: dict[str, float] = {}  # as they were set
+        self._sliders: dict[str, float] = {}  # values that the user has set
         self._jobs: dict[str, Background] = {}
-        self._ghost: Ghost | None = None  # that is wanted, and may compile
+        self._ghost: Ghost | None = None  # the requested ghost, whose kernel may still compile
         self._ready, self._wanted = {subject.accuracy}, subject.accuracy
         work = subject.rehearsal()
         if work is not None:
@@ -81,31 +82,31 @@ class Controls:
     # --- the user's hand ---------------------------------------------------------------------------------------
 
     def drag(self, body: int, point_body, target) -> None:
-        """Drag a body by a spring until `release`.
+        """Pull a body by a spring from now on, until `release`.
 
         Parameters
         ----------
         body : int
         point_body : (3,) array_like
-            Point of the body, from its centre of mass, body frame [m].
+            Point of the body that the spring is attached to, from its centre of mass, body frame [m].
         target : (3,) array_like
-            Where it is pulled to, world frame [m].
+            Other end of the spring, world frame [m].
 
         Raises
         ------
         ValueError
-            No such body, numbers that are not finite, or a subject that cannot be dragged.
+            No such body, numbers that are not finite, or a subject whose bodies cannot be dragged.
         """
         self._needs("drag")
         self._run.give("drag", self._body(body), _vector(point_body, "point_body"), _vector(target, "target"))
 
     def release(self) -> None:
-        """End a `drag`."""
+        """Remove the spring of `drag`."""
         if self._run.hand.body is not None:
             self._run.give("release")
 
     def kick(self, body: int, impulse) -> None:
-        """Push a body at its centre of mass in the next step: an impulse (3,), world frame [N s]."""
+        """Apply an impulse (3,) to a body at its centre of mass in the next step, world frame [N s]."""
         self._needs("drag")
         self._run.give("kick", self._body(body), _vector(impulse, "impulse"))
 
@@ -115,15 +116,15 @@ class Controls:
     # --- sliders -----------------------------------------------------------------------------------------------
 
     def set_gravity(self, strength: float) -> None:
-        """Change the strength of gravity at once, at least 0 [m/s²]; its direction stays."""
+        """Change the strength of gravity at once, to a number of at least 0 [m/s²]; its direction stays."""
         self._slide("gravity", strength)
 
     def set_friction(self, mu: float) -> None:
-        """Change the coefficient of friction of all bodies at once, at least 0."""
+        """Change the friction coefficient of all bodies at once, to a number of at least 0."""
         self._slide("friction", mu)
 
     def set_restitution(self, e: float) -> None:
-        """Change the coefficient of restitution of all bodies at once, 0 to 1."""
+        """Change the restitution coefficient of all bodies at once, to a number from 0 to 1."""
         self._slide("restitution", e)
 
     @property
@@ -140,11 +141,11 @@ class Controls:
 
     @property
     def accuracy(self) -> str:
-        """Name of the preset, ``custom``, or empty where nothing is simulated."""
+        """Name of the accuracy: a preset or ``custom``; empty if the subject is not simulated."""
         return self.subject.accuracy
 
     def set_accuracy(self, preset: str) -> None:
-        """Go on at another preset, from the same state, once its kernel is there.
+        """Continue with another preset from the same state, as soon as its kernel is compiled.
 
         Raises
         ------
@@ -164,11 +165,14 @@ class Controls:
 
     @property
     def ghost_label(self) -> str:
-        """Name of the ghost, with its own error where it has one; empty without one."""
+        """Name of the ghost, with its own error if it is only an estimate; empty if there is no ghost."""
         return "" if self._run.ghost is None else self._run.ghost.label
 
     def set_ghost(self, on: bool) -> None:
-        """Show the same scene at ``reference`` beside it, from this moment on, once its kernel is there; or do not."""
+        """Show or remove the ghost: the same scene at the accuracy ``reference``, started from the present state.
+
+        The ghost appears when its kernel is compiled.
+        """
         if not on:
             self._run.ghost = self._ghost = None
             self._jobs.pop(GHOST, None)
@@ -181,17 +185,17 @@ class Controls:
 
     @property
     def is_compiling(self) -> bool:
-        """Something compiles in the background."""
+        """True while a kernel compiles in the background."""
         return bool(self._jobs)
 
     def wait(self) -> None:
-        """Wait until nothing compiles any more."""
+        """Wait until no kernel compiles in the background."""
         for job in list(self._jobs.values()):
             job.join()
         self._poll()
 
     def _poll(self) -> None:
-        """Take over what has compiled."""
+        """Apply the results of background jobs that have ended, and report their errors."""
         for name in [name for name, job in self._jobs.items() if job.is_done]:
             error = self._jobs.pop(name).error
             if error is not None:
@@ -206,5 +210,5 @@ class Controls:
 
 
 def _vector(value, name: str) -> np.ndarray:
-    """(3,) finite numbers, a copy."""
+    """Copy of three finite numbers as a (3,) array; `name` names them in an error."""
     return np.array(validation.finite(value, (3,), name))

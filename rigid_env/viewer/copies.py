@@ -1,4 +1,4 @@
-"""Copies of worlds to look at: with effects declared that sliders change, and carried into another accuracy."""
+"""Copies of worlds for the viewer: with the effects that sliders change, and with another accuracy."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from physics.annotations import Preset
 from physics.world.snapshot import KEPT
 
 CUSTOM = "custom"
-"""Name of an accuracy that is no preset."""
+"""Name of an accuracy that equals no preset."""
 
 FORGOTTEN = ("memory", "report_table", "sleep")
-"""Arrays of a snapshot that another accuracy begins anew: warm starts, reports, sleep."""
+"""Arrays of a snapshot that start from zero at another accuracy: warm starts, reports and sleep."""
 
 
 def accuracy_name(accuracy: Preset | Accuracy) -> str:
-    """Name of the preset that an accuracy is, or `CUSTOM`."""
+    """Name of the preset that an accuracy equals, or `CUSTOM`."""
     settings = resolve(accuracy)
     return next((name for name, preset in PRESETS.items() if preset == settings), CUSTOM)
 
 
 def declared(scene: physics.Scene) -> physics.Scene:
-    """The same scene, with gravity, friction and restitution among its effects, so that each can be changed.
+    """Scene with gravity, friction and restitution among its effects, so that sliders can change each of them.
 
-    What is added acts as 0. Friction and restitution belong to contact: a scene without `Contact` does not get them,
-    and contact with a stiffness gets no restitution.
+    Added effects have the value 0. Friction and restitution belong to contact: a scene without `Contact` does not get
+    them, and contact with a stiffness gets no restitution.
     """
     effects = list(scene.effects)
     if scene.effect(Gravity) is None:
@@ -44,14 +44,14 @@ def declared(scene: physics.Scene) -> physics.Scene:
     if effects == list(scene.effects):
         return scene
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", physics.SceneWarning)  # the user has seen it
+        warnings.simplefilter("ignore", physics.SceneWarning)  # the user's own scene has warned already
         return replace(scene, effects=tuple(effects))
 
 
 def fitted(snapshot: physics.Snapshot, world: physics.World) -> physics.Snapshot:
-    """Snapshot for a world of the same scene at another accuracy, or with effects that act as 0 declared.
+    """Convert a snapshot for a world of the same scene that has another accuracy or further effects of value 0.
 
-    States, parameters, gravity, time and actuators are those of `snapshot`; the rest begins anew.
+    States, parameters, gravity, time and actuators are those of `snapshot`; the arrays in `FORGOTTEN` are zero.
     """
     given, own = (dict(zip(KEPT, each.arrays)) for each in (snapshot, world.snapshot()))
     arrays = [np.zeros_like(own[name]) if name in FORGOTTEN else given[name] for name in own]
@@ -59,9 +59,10 @@ def fitted(snapshot: physics.Snapshot, world: physics.World) -> physics.Snapshot
 
 
 def copied(world: physics.World, accuracy: Preset | Accuracy | None = None, dt: float | None = None) -> physics.World:
-    """World of its own, of one world, in the state of the first world of a batch, in which sliders act.
+    """Copy the first world of a batch into a new batch of one world, whose scene has the effects that sliders change.
 
-    It goes on bit by bit as the first world does if the scene, the accuracy and the step are the same.
+    The copy continues bit for bit as the first world does, if accuracy and step stay the same (None) and the scene
+    declares these effects already.
     """
     scene = declared(world.scene)
     new = physics.World(scene, dt=world.dt if dt is None else dt, accuracy=accuracy or world.accuracy)
@@ -72,13 +73,13 @@ def copied(world: physics.World, accuracy: Preset | Accuracy | None = None, dt: 
 
 
 def with_parameters(snapshot: physics.Snapshot, source: physics.World) -> physics.Snapshot:
-    """The snapshot with parameters and gravity of another world of the same scene."""
+    """Copy of a snapshot with the parameters and gravity of the world `source`, which has the same scene."""
     arrays = dict(zip(KEPT, snapshot.arrays)) | {"params": source.params.copy(), "gravity": source.gravity.copy()}
     return replace(snapshot, arrays=tuple(arrays.values()))
 
 
 def warm(world: physics.World) -> None:
-    """Compile what a viewer calls of a world, by a step that whoever uses the world undoes."""
+    """Compile everything that a viewer calls of a world by taking one step; the caller restores the state."""
     world.step()
     physics.diagnose(world)
     world.contacts()

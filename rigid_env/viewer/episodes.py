@@ -1,4 +1,4 @@
-"""An environment that is played live, in a copy of it and its wrappers: episode after episode, by a policy."""
+"""Environment that the viewer plays live: episodes in a copy of the environment, driven by a policy."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from rigid_env.viewer.worlds import LiveSubject
 Policy = Callable[[Any], np.ndarray]
 
 Chain = tuple[TaskState, list[dict[str, Any]]]
-"""State of an environment, and what each of its wrappers remembers."""
+"""Type: state of an environment, and for each of its wrappers a dict with a copy of its attributes."""
 
 APART = ("env", "spec", "metadata")
-"""Attributes of wrappers that are no state."""
+"""Attributes of wrappers that do not belong to a state."""
 
 
 class State(NamedTuple):
-    """All that decides how an environment goes on, the random actions included."""
+    """Everything that decides how a played environment continues, random actions included."""
 
     chain: Chain
     observation: Any
@@ -40,20 +40,21 @@ class State(NamedTuple):
 
 
 class LiveEnv(LiveSubject):
-    """Environment in which a policy acts, and the user.
+    """Environment that is played live: a policy acts in it, and so does the user.
 
-    An episode that has ended is followed by the next one, with the next step.
+    After the end of an episode, the next step begins a new one.
 
     Parameters
     ----------
     env : gymnasium.Env
-        Of a `RigidEnv`, wrapped or not; it stays as it is.
+        A `RigidEnv`, wrapped or not; it is copied and stays unchanged.
     name : str
+        Short name for titles.
     seed : int
-        Of the first episode, if the environment has none begun, and of random actions.
+        Seed of random actions, and of the first episode if the environment has not begun one.
     policy : callable, optional
-        Observations with the worlds first, (1, entries) or a dict of such arrays, to actions (1, numbers). None: random
-        actions.
+        Function from observations to actions, both with the worlds first: (1, entries) or a dict of such arrays to
+        (1, numbers). None: random actions.
     accuracy : str or Accuracy, optional
         None: the environment's.
     """
@@ -76,10 +77,14 @@ class LiveEnv(LiveSubject):
     def _begin_run(self, seed: int) -> None:
         self.seed, self._generator = seed, np.random.default_rng(seed)
         self._is_ended, self._episode = False, (0, 0.0)
-        self._shift = 0.0  # where gusts blow, a reset sets the time of the world to 0
+        self._shift = 0.0  # time of the viewer minus time of the world [s]: with gusts, a reset sets the latter to 0
 
     def _begin_first(self, seed: int) -> None:
-        """Go on with the episode that has begun, or begin one: where none has, or its observation cannot be read."""
+        """Continue the environment's current episode, or begin one.
+
+        A new episode begins if the environment has none, or if a policy needs an observation that only a wrapper can
+        make.
+        """
         inner = self._env.unwrapped
         is_waiting = inner.get_state().arrays["waiting"][0]
         is_changed = self._env.observation_space != inner.observation_space  # by a wrapper
@@ -95,7 +100,7 @@ class LiveEnv(LiveSubject):
 
     @property
     def message(self) -> str:
-        """Episode and return so far."""
+        """Number of the episode, and its return so far."""
         number, total = self._episode
         return f"episode {number + 1}, return {total:.2f}"
 
@@ -155,7 +160,7 @@ class LiveEnv(LiveSubject):
     # --- parameters and accuracy ---------------------------------------------------------------------------------
 
     def _hold(self, name: str, value: float) -> None:
-        """Change a parameter now, and in later episodes where they draw it."""
+        """Change a parameter now, and also in later episodes if the task draws it."""
         if name in self._task.own_draws:
             self._task.hold(name, value)
         else:
@@ -171,9 +176,9 @@ class LiveEnv(LiveSubject):
 
 
 def copied_env(env: gym.Env, accuracy: Preset | Accuracy | None = None) -> gym.Env:
-    """Copy an environment and its wrappers, in a world of its own in which sliders act; it opens no window.
+    """Copy an environment with its wrappers; the copy has a world of its own in which sliders act, and opens no window.
 
-    Every reference to the world in it becomes one to a new world at this accuracy (None: the same), in the same state.
+    The copy's world has the same state, and the given accuracy (None: the same).
     """
     task = env.unwrapped.task
     own = copy.deepcopy(env, {id(task.world): copied(task.world, accuracy)})
@@ -185,14 +190,14 @@ def copied_env(env: gym.Env, accuracy: Preset | Accuracy | None = None) -> gym.E
 
 
 def wrappers(env: gym.Env) -> Iterator[gym.Wrapper]:
-    """Wrappers of an environment, the outermost first."""
+    """Wrappers around an environment, the outermost first."""
     while isinstance(env, gym.Wrapper):
         yield env
         env = env.env
 
 
 def take_chain(env: gym.Env) -> Chain:
-    """State of an environment, and copies of what its wrappers remember."""
+    """Copy the state of an environment, and the attributes of its wrappers."""
     remembered = []
     for wrapper in wrappers(env):
         kept = {name: value for name, value in vars(wrapper).items() if name not in APART}
@@ -201,7 +206,7 @@ def take_chain(env: gym.Env) -> Chain:
 
 
 def put_chain(env: gym.Env, chain: Chain, is_other: bool = False) -> None:
-    """Let an environment and its wrappers go on from a state of `take_chain`; `is_other`: of another accuracy."""
+    """Restore an environment and its wrappers from `take_chain`; `is_other`: taken at another accuracy."""
     state, remembered = chain
     if is_other:
         state = replace(state, world=fitted(state.world, env.unwrapped.task.world))
@@ -211,7 +216,7 @@ def put_chain(env: gym.Env, chain: Chain, is_other: bool = False) -> None:
 
 
 def _rehearsed(env: gym.Env) -> Callable[[], None]:
-    """Work that compiles what an environment calls, by an episode of one step."""
+    """Make a function that compiles what an environment calls, by running one step of an episode."""
 
     def work() -> None:
         env.reset(seed=0)

@@ -1,7 +1,7 @@
-"""One page for a motion, with a time line, that plays offline: a file, or a frame in a notebook.
+"""Make a motion one HTML page that plays offline, as a file or as a frame in a notebook.
 
-viser's own client is in the page, with the messages it would have got from a server and their times. Its player has
-play and pause (also the space bar), a time line, the speed and a tree of the scene, in which layers can be hidden.
+The page contains viser's own client, and the messages that a server would have sent to it, with their times. Its player
+has play and pause (also the space bar), a time line, the speed, and a tree of the scene in which layers can be hidden.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from rigid_env.viewer.stage import LAYERS, Stage
 TITLE = "<title>Viser</title>"
 
 TIME_SLACK = 1e-9
-"""Share of the time between pictures by which a look may come too early."""
+"""Largest share of the time between two pictures by which a look may come too early and still be taken."""
 
 HEIGHT = 480
-"""[px]. Of the frame in the notebook."""
+"""[px] Height of the frame in a notebook."""
 
 
 def page_of(
@@ -39,34 +39,35 @@ def page_of(
     layers: Iterable[str] | None = None,
     title: str = "rigid-env",
 ) -> str:
-    """Make a motion an HTML page that plays in a browser without a network.
+    """Make an HTML page of a motion, which plays in a browser without a network.
 
-    Poses are float32, as everywhere in viser; nothing is interpolated. The page has viser's client (about 0.8 MB) and,
-    for each picture, 28 bytes for each body that moves, before compression.
+    Poses are float32, as everywhere in viser, and are not interpolated. The page has viser's client (about 0.8 MB), and
+    for each picture 28 bytes per moving body, before compression.
 
     Parameters
     ----------
     looks : iterable of Look
-        In order of time. The first one is shown at time 0.
+        Moments of the motion, in order of time. The first one is shown at time 0.
     scene : Scene, optional
-        Its fields are drawn.
+        Scene whose wind, fluids and springs are drawn.
     duration : float
-        Looks later than this after the first are left out [s].
+        Looks that are later than this after the first are left out [s].
     fps : float
-        Pictures a second at most: looks that are nearer to the last one taken are left out [1/s].
+        Most pictures per second [1/s]; looks that come too soon after the last picture are left out.
     layers : iterable of str, optional
-        Names of the layers that are shown, of `stage.LAYERS`. None: those that are shown at first.
+        Names of the layers that are shown, of `stage.LAYERS`. None: those that are on by default.
     title : str
-        Of the page.
+        Title of the page.
 
     Returns
     -------
     str
+        Text of the page.
 
     Raises
     ------
     ValueError
-        No looks, times that go back, an unknown layer, or a number that is not positive.
+        No looks, times that decrease, an unknown layer, or a number that is not positive.
     gymnasium.error.DependencyNotInstalled
         If viser is missing.
     """
@@ -84,7 +85,7 @@ def page_of(
 
 
 def write_page(page: str, path: str | Path) -> Path:
-    """Write a page as a file, whole or not at all; returns the path."""
+    """Write the text of a page to a file, which is complete or not there at all; returns the path."""
     path = Path(path)
     partial = path.with_name(f".{path.name}.part")
     try:
@@ -96,12 +97,12 @@ def write_page(page: str, path: str | Path) -> Path:
 
 
 def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[Look]:
-    """Looks up to `duration` [s] after the first that are at least `interval` [s] apart.
+    """Choose looks that are at least `interval` [s] apart, up to `duration` [s] after the first.
 
     Raises
     ------
     ValueError
-        If times go back.
+        If times decrease.
     """
     start = before = due = None
     for look in looks:
@@ -119,7 +120,10 @@ def taken(looks: Iterable[Look], duration: float, interval: float) -> Iterator[L
 
 
 def _record(looks: list[Look], scene: Scene | None, shown: list[str]) -> str:
-    """Show looks on a stage that nobody sees, and keep its messages."""
+    """Show looks on a stage without a browser, and return the recorded messages as an HTML page.
+
+    `scene` has the fields that are drawn; `shown` has the names of the layers that are on.
+    """
     with server_for_a_while() as server:
         stage = Stage(server, fields=scene, bounds=_bounds(looks))
         for name in LAYERS:
@@ -133,7 +137,7 @@ def _record(looks: list[Look], scene: Scene | None, shown: list[str]) -> str:
 
 
 def _bounds(looks: list[Look]):
-    """Lower and upper corner (3,) [m] of all places where bodies are."""
+    """Lower and upper corner (3,) [m] of the box that holds all bodies in all looks; None if there are no bodies."""
     boxes = []
     for look in looks:
         pos, radius = look.frame.poses.pos, np.asarray(look.radius)[:, None]
@@ -153,21 +157,21 @@ def _escaped(text: str) -> str:
 
 
 def in_notebook() -> bool:
-    """True in a notebook, local or hosted: where outputs are pages, not text."""
+    """True if the program runs in a notebook, local or hosted, whose outputs can be HTML."""
     get_ipython = getattr(sys.modules.get("IPython"), "get_ipython", None)
     shell = get_ipython() if get_ipython is not None else None
     return shell is not None and hasattr(shell, "kernel")
 
 
 def frame_of_page(page: str, height: int = HEIGHT) -> str:
-    """HTML of a frame that holds a whole page: nothing is loaded from elsewhere.
+    """HTML of a frame that contains a whole page, so that nothing is loaded from elsewhere.
 
     Parameters
     ----------
     page : str
         Text of a self-contained HTML page, such as `page_of` makes.
     height : int
-        [px].
+        Height of the frame [px].
 
     Raises
     ------
@@ -183,7 +187,7 @@ def frame_of_page(page: str, height: int = HEIGHT) -> str:
 
 
 class Embedded:
-    """Page that a notebook shows as the value of a cell."""
+    """Value of a notebook's cell that the notebook shows as a page, in a frame `height` pixels high."""
 
     def __init__(self, page: str, height: int = HEIGHT):
         self._frame = frame_of_page(page, height)
@@ -196,7 +200,7 @@ class Embedded:
 
 
 def embed(page: str, height: int = HEIGHT) -> None:
-    """Show a page in the output of the running cell.
+    """Show a page in the output of the running cell, in a frame `height` pixels high.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Ghost: the same scene at the accuracy ``reference``, from the same state and with the same inputs."""
+"""Ghost of a world: the same scene at the accuracy ``reference``, with the same start and the same inputs."""
 
 from __future__ import annotations
 
@@ -24,24 +24,26 @@ REFERENCE = "reference"
 
 
 class Ghost:
-    """World at `REFERENCE` beside another one.
+    """World at the accuracy `REFERENCE` that takes the same steps as another world, to show the error of that world.
 
-    Where bodies touch each other or are tied together, `REFERENCE` bounds the error of each step, and what becomes of
-    that is not known. A second world with tolerances ten times as large then goes along, as in
-    `physics.work_precision.truth.ReferenceTruth`: the distance of the two is the error that the label states.
+    Event-driven schemes follow the true motion nearly to rounding. Other schemes, used where bodies touch each other or
+    are tied together, bound only the error of each step, so the ghost's error after many steps is unknown. A second
+    world with tolerances ten times as large then takes the same steps, as in
+    `physics.work_precision.truth.ReferenceTruth`. The distance between the two estimates the ghost's own error.
 
     Parameters
     ----------
     world : World
-        Of one world, which it goes along with.
+        World that the ghost follows, a batch of one.
 
     Attributes
     ----------
     world : World
+        World of the ghost.
     is_estimate : bool
-        `REFERENCE` has an error itself here.
+        True if the ghost has an error of its own, so that it is only an estimate of the true motion.
     cost : Cost
-        Of `world` alone.
+        Computing time of `world` alone.
     """
 
     def __init__(self, world: physics.World):
@@ -59,21 +61,21 @@ class Ghost:
         return [self.world] if self._looser is None else [self.world, self._looser]
 
     def warm(self) -> None:
-        """Compile the kernel; `start` undoes the step that is taken for it."""
+        """Compile the kernel by taking a step; `start` then sets the state."""
         warm(self.world)
 
     def start(self, snapshot: physics.Snapshot) -> None:
-        """Go on from the state of another world of the scene."""
+        """Continue from the state of another world of the scene."""
         for world in self._worlds:
             world.restore(fitted(snapshot, world))
 
     def take_parameters(self, world: physics.World) -> None:
-        """Take over gravity and the parameters of bodies; states stay."""
+        """Copy gravity and the parameters of bodies from another world; the states stay."""
         for own in self._worlds:
             own.restore(with_parameters(own.snapshot(), world))
 
     def follow(self, calls: Iterable[Call]) -> None:
-        """Take the same steps as another world.
+        """Make the same calls of `World.step` that another world has made.
 
         Raises
         ------
@@ -90,45 +92,45 @@ class Ghost:
                 _take(self._looser, call)
 
     def distance(self, world: physics.World) -> tuple[float, float]:
-        """Largest distance of a body's centre of mass from the ghost's [m], and largest angle between the two [rad]."""
+        """Largest distance of a centre of mass from the ghost's [m], and largest angle between attitudes [rad]."""
         return distance(world, self.world)
 
     @property
     def own_error(self) -> float:
-        """Error of the ghost itself: largest distance of a centre of mass [m]; NaN where it is no estimate."""
+        """Error of the ghost: largest distance of a centre of mass from the second world [m]; NaN if not estimated."""
         return math.nan if self._looser is None else distance(self._looser, self.world)[0]
 
     @property
     def label(self) -> str:
-        """Name of the ghost, with its own error where it has one."""
+        """Name of the ghost, with its own error if it is an estimate."""
         return f"{REFERENCE}, itself within {self.own_error:.1e} m" if self.is_estimate else REFERENCE
 
     def snapshot(self) -> tuple[physics.Snapshot, ...]:
-        """All that decides how it goes on."""
+        """Copy of everything that decides how the ghost continues."""
         return tuple(world.snapshot() for world in self._worlds)
 
     def restore(self, snapshots: tuple[physics.Snapshot, ...]) -> None:
-        """Go on from a `snapshot`."""
+        """Continue from a result of `snapshot`."""
         for world, snapshot in zip(self._worlds, snapshots, strict=True):
             world.restore(snapshot)
 
     def frame(self) -> Frame:
-        """Picture of it, without arrows."""
+        """Picture of the ghost's bodies, without arrows."""
         return world_frame(self.world, arrows=False)
 
 
 def _take(world: physics.World, call: Call) -> None:
-    """Take the steps of a call."""
+    """Make a recorded call of `World.step` in a world."""
     with nullcontext() if world.actuation is None else world.actuation.passed_by(call.past):
         world.step(call.wrench, call.steps, call.dt)
 
 
 def _looser(acting: physics.Accuracy) -> physics.Accuracy:
-    """Accuracy with tolerances ten times as large."""
+    """Accuracy with tolerance and slop ten times as large."""
     return replace(acting, tolerance=LOOSER * acting.tolerance, slop=LOOSER * acting.slop)
 
 
 def distance(one: physics.World, other: physics.World) -> tuple[float, float]:
-    """Largest distance of two worlds' centres of mass [m], and largest angle between their bodies [rad]."""
+    """Largest distance between centres of mass in two worlds [m], and largest angle between attitudes [rad]."""
     apart = np.linalg.norm(one.pos[0] - other.pos[0], axis=-1)
     return float(apart.max()), float(angles_between(one.quat[0], other.quat[0]).max())

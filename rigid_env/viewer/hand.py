@@ -1,4 +1,4 @@
-"""Hand of the user in a world, or in a task: a spring that drags a body, and kicks."""
+"""Hand of the viewer's user in a world or a task: a spring that drags one body, and kicks."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ if TYPE_CHECKING:
     from rigid_env.tasks.disturbances import Disturbances
 
 RATE = 10.0
-"""Angular frequency at which the spring swings the body's mass [rad/s]."""
+"""Angular frequency of the dragged body's mass on the spring [rad/s]."""
 
 LARGEST_TURN = 0.25
-"""Largest angle by which it may swing in a step, which bounds the frequency [rad]."""
+"""Largest phase of this oscillation in one step [rad]; it bounds the angular frequency."""
 
 DAMPING = 0.7
-"""Share of critical damping."""
+"""Damping of the spring as a share of critical damping."""
 
 
 @dataclass
 class Hand:
-    """Spring and kicks; their forces are held over a step.
+    """Spring and kicks of the user; their forces are constant over a step.
 
     Attributes
     ----------
     body : int or None
-        Dragged; None: none.
+        Body that the spring drags; None: no body.
     point : (3,) float
-        Of the body that the spring holds, from its centre of mass, body frame [m].
+        Point of the body where the spring is attached, from its centre of mass, body frame [m].
     target : (3,) float
         Other end of the spring, world frame [m].
     kicks : dict of int to (3,) float
@@ -46,11 +46,11 @@ class Hand:
     kicks: dict[int, np.ndarray] = field(default_factory=dict)
 
     def copy(self) -> Hand:
-        """Another hand that does the same."""
+        """Copy of the hand, with the same spring and kicks."""
         return Hand(self.body, self.point, self.target, dict(self.kicks))
 
     def kick(self, body: int, impulse: np.ndarray) -> None:
-        """Add an impulse [N s] through the centre of a body."""
+        """Add an impulse (3,) through the centre of mass of a body, world frame [N s]."""
         self.kicks[body] = self.kicks.get(body, np.zeros(3)) + impulse
 
     def ends(self, world: physics.World) -> tuple[np.ndarray, np.ndarray] | None:
@@ -61,7 +61,7 @@ class Hand:
         return world.pos[0, self.body] + arm, self.target.copy()
 
     def load(self, world: physics.World, interval: float) -> np.ndarray | None:
-        """(bodies, 6) wrench of a step that takes `interval` [s]: force [N] and torque [N m]; None if there is none."""
+        """Wrench (bodies, 6) of the hand in a step of `interval` [s]: force [N], torque [N m], world frame; or None."""
         if self.body is None and not self.kicks:
             return None
         load = np.zeros((world.body_count, 6))
@@ -72,7 +72,10 @@ class Hand:
         return load
 
     def _spring(self, world: physics.World, interval: float) -> np.ndarray:
-        """(6,) wrench of the spring: its rate is bounded such that a force held over a step does not make it swing."""
+        """Wrench (6,) of the spring on the dragged body: force [N] and torque [N m], world frame.
+
+        The spring's rate is bounded so that a force that is constant over a step does not make the body oscillate.
+        """
         params, body = world.params[self.body], self.body
         arm = rotation_matrices(world.quat[0, body]) @ self.point
         velocity = world.linvel[0, body] + np.cross(world.angvel[0, body], arm)
@@ -84,7 +87,11 @@ class Hand:
 
 
 def _least_mass(params: np.ndarray, quat: np.ndarray, arm: np.ndarray) -> float:
-    """Least mass that a force at a point of a body meets, over all its directions [kg]."""
+    """Smallest effective mass of a body for a force at a point of it, over all directions of the force [kg].
+
+    `params` are the body's parameters, `quat` its attitude, and `arm` (3,) points from its centre of mass to the point
+    [m].
+    """
     frame = rotation_matrices(quat) @ rotation_matrices(params[at.PRINCIPAL : at.PRINCIPAL + 4])
     inverse = frame * params[at.INV_INERTIA : at.INV_INERTIA + 3] @ frame.T
     x, y, z = arm
@@ -93,16 +100,17 @@ def _least_mass(params: np.ndarray, quat: np.ndarray, arm: np.ndarray) -> float:
 
 
 class HandOfUser:
-    """Forces of the user in a task: in the place of its disturbances, which act besides.
+    """Disturbances of a task with the user's force added; an object of this class replaces the task's `disturbed`.
 
     Parameters
     ----------
     inner : Disturbances or None
+        Disturbances of the task itself.
 
     Attributes
     ----------
     pull : (bodies, 6) float64 or None
-        Force [N] and torque [N m] of the user in the coming control step.
+        Force [N] and torque [N m] of the user in the coming control step, world frame.
     """
 
     def __init__(self, inner: Disturbances | None):
@@ -110,12 +118,12 @@ class HandOfUser:
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
-        """Arrays of the task's own disturbances."""
+        """Arrays of the task's own disturbances, by name."""
         return {} if self.inner is None else self.inner.arrays
 
     @property
     def load(self) -> np.ndarray | float:
-        """Loads of the task's own disturbances in the last control step; the user's hand is drawn as a spring."""
+        """Loads of the task's own disturbances in the last control step; the user's force is drawn as a spring."""
         return 0.0 if self.inner is None else self.inner.load
 
     def due(self) -> np.ndarray:
@@ -123,12 +131,12 @@ class HandOfUser:
         return np.zeros(0, dtype=np.int64) if self.inner is None else self.inner.due()
 
     def begin(self, rows: np.ndarray) -> None:
-        """Begin episodes."""
+        """Draw the first disturbances of the task for episodes that begin in worlds `rows`."""
         if self.inner is not None:
             self.inner.begin(rows)
 
     def act(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Load (1, bodies, 6) of the coming control step, and of its first physics step besides, or None."""
+        """Load (1, bodies, 6) of the coming control step, and a further one of its first physics step; or None."""
         load, push = (None, None) if self.inner is None else self.inner.act()
         if self.pull is None:
             return load, push

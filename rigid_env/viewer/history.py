@@ -1,4 +1,4 @@
-"""History of a run: states to go back to, inputs and records with which steps are taken again, samples for plots."""
+"""History of a run: states to return to, inputs and records by which steps are repeated, and samples for plots."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 EVERY = 16
-"""Steps from one kept state to the next, at first."""
+"""Number of steps between two kept states at first; it doubles when they exceed `ROOM`."""
 
 ROOM = 128 * 2**20
-"""Memory that kept states may take [bytes]: beyond it every second one goes, and those to come are twice as far apart.
-"""
+"""Memory that kept states may take [bytes]; beyond it every second state is dropped and the interval is doubled."""
 
 UNITS = {
     "time": "s",
@@ -30,21 +29,24 @@ UNITS = {
     "cost": "µs/s",
     "cost_of_reference": "µs/s",
 }
-"""Columns, in their order, and their units."""
+"""Columns of `Samples` in their order, with their units."""
 
 FIRST_ROOM = 1024
-"""Rows that there is room for at first; it is doubled as needed."""
+"""Rows of the table of samples at first; it is doubled when it is full."""
 
 
 class Input(NamedTuple):
-    """Something that the user did before a step: the name of a method of `session.Session`, and its arguments."""
+    """Action of the user before a step: the name of an action that `run.Run.give` knows, and its arguments."""
 
     name: str
     arguments: tuple
 
 
 class Entry(NamedTuple):
-    """State of a run before a step, after some of the inputs that were given there."""
+    """State of a run before step `index`, kept after the first `inputs` of the inputs given at that step.
+
+    `size` is the memory of the state [bytes].
+    """
 
     index: int
     state: Any
@@ -53,23 +55,25 @@ class Entry(NamedTuple):
 
 
 class History:
-    """States of some steps, inputs and records of all.
+    """States of some steps of a run, and inputs and records of all steps.
 
     Parameters
     ----------
+    time : float
+        Time at the start of the run [s].
     room : int
-        [bytes].
+        Memory that the kept states may take [bytes].
 
     Attributes
     ----------
     times : list of float
-        Before each step, and after the last [s].
+        Time before each step, and after the last [s].
     records : list
-        For each step what has to be given to the subject to repeat it.
+        For each step, the object from `Subject.step` with which the subject can repeat it.
     event_counts : list of int
-        Events up to each of the `times`.
+        Number of events up to each of the `times`.
     inputs : dict of int to list of Input
-        Given before each step, by its index.
+        Inputs before each step, by the index of the step.
     """
 
     def __init__(self, time: float, room: int = ROOM):
@@ -80,7 +84,7 @@ class History:
 
     @property
     def last(self) -> int:
-        """Index of the latest time."""
+        """Index of the latest of the `times`: the number of steps."""
         return len(self.records)
 
     @property
@@ -89,15 +93,15 @@ class History:
         return self._size
 
     def index_at(self, time: float) -> int:
-        """Index of the last of the `times` that is not later than `time`, within rounding."""
+        """Index of the latest of the `times` that is not after `time` [s], within rounding."""
         return max(0, bisect_right(self.times, time * (1.0 + 1e-12) + 1e-12) - 1)
 
     def is_due(self, index: int) -> bool:
-        """True if the state before this step is to be kept."""
+        """True if the state before step `index` is to be kept."""
         return index % self._every == 0
 
     def keep(self, index: int, state: Any) -> None:
-        """Keep the state before a step, later than all that are kept or the same as the last."""
+        """Keep the state before step `index`; kept states of the same or a later step are dropped."""
         while self._entries and self._entries[-1].index >= index:
             self._size -= self._entries.pop().size
         entry = Entry(index, state, len(self.inputs.get(index, ())), size_of(state))
@@ -112,18 +116,18 @@ class History:
         self._size = sum(entry.size for entry in self._entries)
 
     def before(self, index: int) -> Entry | None:
-        """The latest kept state that is not later than this index; None before the first step."""
+        """Kept state of the latest step up to `index`; None if no state is kept."""
         place = bisect_right(self._entries, index, key=lambda entry: entry.index)
         return self._entries[place - 1] if place else None
 
     def add(self, time: float, record: Any, events: int) -> None:
-        """Note a step."""
+        """Add a step: the time after it [s], its record, and the number of events so far."""
         self.times.append(time)
         self.records.append(record)
         self.event_counts.append(events)
 
     def forget(self, index: int) -> None:
-        """Forget all that came after this index; inputs that were given there stay."""
+        """Remove everything after the time with this index; inputs at that time stay."""
         if index == self.last:
             return
         del self.times[index + 1 :], self.records[index:], self.event_counts[index + 1 :]
@@ -133,7 +137,7 @@ class History:
 
 
 def size_of(thing: Any) -> int:
-    """Memory of the arrays in a state, about [bytes]."""
+    """Approximate memory of the arrays in a state [bytes]."""
     if isinstance(thing, np.ndarray):
         return thing.nbytes
     if is_dataclass(thing) and not isinstance(thing, type):
@@ -153,19 +157,20 @@ class Samples:
     Attributes
     ----------
     time : (n,) float64
-        [s].
+        Simulated time [s].
     kinetic_energy, potential_energy, energy : (n,) float64
-        Of all bodies together; the last is their sum [J].
+        Energies of all bodies together, and the sum of both [J].
     momentum : (n,) float64
         Length of the sum of all momenta [kg m/s].
     penetration, residual : (n,) float64
-        Largest of the step [m], [1]; see `physics.StepReport`.
+        Largest penetration [m] and residual [1] of the step; see `physics.StepReport`.
     error, angle : (n,) float64
-        Largest distance of a body's centre from the ghost's, and angle of the rotation between the two [m], [rad].
+        Largest distance between a body's centre of mass and the ghost's [m], and largest angle between their attitudes
+        [rad].
     error_of_reference : (n,) float64
-        Of the ghost itself, where it is only an estimate [m].
+        Error of the ghost itself, if it is only an estimate [m].
     cost, cost_of_reference : (n,) float64
-        Time of computing per simulated second, smoothed [µs/s].
+        Computing time per simulated second, smoothed [µs/s], of the subject and of the ghost.
     """
 
     def __init__(self):
@@ -182,12 +187,12 @@ class Samples:
         return column
 
     def append(self, **values: float) -> None:
-        """Add a sample; columns that are not given are NaN."""
+        """Add a sample by column names; missing columns are NaN."""
         if self._count == len(self._table):
             self._table = np.concatenate((self._table, np.empty_like(self._table)))
         self._table[self._count] = [values.get(name, np.nan) for name in UNITS]
         self._count += 1
 
     def truncate(self, count: int) -> None:
-        """Keep the first `count` samples."""
+        """Keep only the first `count` samples."""
         self._count = min(self._count, count)

@@ -1,4 +1,7 @@
-"""Subject: anything that can be played, behind one interface, and its looks; `rigid_env.viewer.subject` makes one."""
+"""Base class `Subject` of things that the viewer can play, and `Look`, the data of one picture.
+
+`rigid_env.viewer.subject` makes subjects of worlds, environments, recordings and trajectories.
+"""
 
 from __future__ import annotations
 
@@ -16,23 +19,24 @@ from rigid_env.viewer.listening import Listener
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """Everything that the viewer draws at a moment. World frame, SI units.
+    """Everything that the viewer draws of one moment, in the world frame and SI units.
 
     Parameters
     ----------
     frame : Frame
         Bodies, walls, goal, contacts and the applied wrench.
     time : float
-        [s].
+        Simulated time [s].
     linvel, angvel : (bodies, 3) float
-        [m/s] and [rad/s].
+        Velocities of centres of mass [m/s], and angular velocities [rad/s].
     is_asleep : (bodies,) bool
+        Sleeping bodies.
     radius : (bodies,) float
-        Of a sphere round `BodyView.pos` that holds the body [m].
+        Radius of a sphere about `BodyView.pos` that holds the body [m].
     drag : pair of (3,) float or None
-        Ends of the spring by which the mouse drags a body: on the body, and at the mouse [m].
+        Ends of the spring by which the user drags a body: on the body, and at the mouse [m].
     ghost : Frame or None
-        The same scene at the accuracy ``reference``.
+        Bodies of the same scene at the accuracy ``reference``.
     """
 
     frame: Frame
@@ -47,20 +51,20 @@ class Look:
 
 @dataclass(frozen=True)
 class Can:
-    """Controls that a subject allows.
+    """Controls that a subject allows; those that are False are not shown.
 
     Attributes
     ----------
     drag : bool
         Drag and kick bodies.
     gravity, friction, restitution : bool
-        Change them.
+        Change this parameter by a slider.
     accuracy : bool
         Change the preset.
     ghost : bool
-        Show `reference` beside it.
+        Show the same scene at the accuracy ``reference`` beside it.
     seed : bool
-        Another seed makes another run.
+        Choose a seed, if different seeds lead to different runs.
     """
 
     drag: bool = False
@@ -73,20 +77,24 @@ class Can:
 
 
 class Subject:
-    """Base of all subjects.
+    """Base class of everything that the viewer can play.
 
     Attributes
     ----------
     name : str
-        Short, for titles.
+        Short name for titles.
     can : Can
+        Controls that it allows.
     accuracy : str
-        Name of the preset, `copies.CUSTOM`, or empty where nothing is simulated.
+        Name of the preset, `copies.CUSTOM`, or empty if it is not simulated.
     seed : int
+        Seed of the run.
     world : World or None
-        Simulated; None where the states are known.
+        World that is simulated; None if the states are read from a trajectory.
+    listener : Listener or None
+        Listener of the world's steps; None without a world.
     message : str
-        Something that the user should know; often empty.
+        Text for the user, often empty.
     """
 
     name = ""
@@ -99,7 +107,7 @@ class Subject:
 
     @property
     def scene(self) -> physics.Scene:
-        """Bodies, walls and effects."""
+        """Scene with bodies, walls and effects."""
         raise NotImplementedError
 
     @property
@@ -109,21 +117,24 @@ class Subject:
 
     @property
     def interval(self) -> float:
-        """Time that the next step takes [s]."""
+        """Length of the next step [s]."""
         raise NotImplementedError
 
     @property
     def end(self) -> float | None:
-        """Time at which it ends [s]; None: it goes on."""
+        """Time at which the subject ends [s]; None: it has no end."""
         return None
 
     @property
     def is_over(self) -> bool:
-        """No step is left."""
+        """True if no step is left."""
         return False
 
     def restart(self, seed: int) -> None:
-        """Go back to the start, with another seed where that matters; the accuracy stays, sliders do not."""
+        """Return to the start, with a new seed if the subject uses one.
+
+        The accuracy stays; sliders return to their first values.
+        """
         raise NotImplementedError
 
     def step(self, load: np.ndarray | None = None, record: Any = None) -> Any:
@@ -132,9 +143,9 @@ class Subject:
         Parameters
         ----------
         load : (bodies, 6) float64, optional
-            Force [N] and torque [N m] besides, world frame.
+            Additional force [N] and torque [N m] of the user on each body, world frame.
         record : optional
-            An earlier step returned it, and the same step is taken again.
+            Return value of an earlier call, to repeat the same step.
 
         Returns
         -------
@@ -144,23 +155,23 @@ class Subject:
         raise NotImplementedError
 
     def snapshot(self) -> Any:
-        """All that decides how it goes on."""
+        """Copy of everything that decides how the subject continues."""
         raise NotImplementedError
 
     def restore(self, snapshot: Any) -> None:
-        """Go on from a `snapshot`, bit for bit."""
+        """Continue from a result of `snapshot`, bit for bit."""
         raise NotImplementedError
 
     def frame(self) -> Frame:
-        """Picture of now."""
+        """Picture of the present state."""
         raise NotImplementedError
 
     def look(self) -> Look:
-        """Everything to draw of now, but for the hand and the ghost."""
+        """Everything to draw of the present state, apart from the user's spring and the ghost."""
         raise NotImplementedError
 
     def measure(self) -> dict[str, float]:
-        """Columns of `history.Samples`, of now and of the last step."""
+        """Numbers of the present state and the last step, by the names of columns of `history.Samples`."""
         raise NotImplementedError
 
     def events(self) -> list[Event]:
@@ -168,9 +179,9 @@ class Subject:
         return []
 
     def settings(self) -> dict[str, float]:
-        """Present values of the sliders that it allows: gravity [m/s²], friction, restitution of body 0."""
+        """Present values of the sliders that the subject allows: gravity [m/s²], friction and restitution of body 0."""
         return {}
 
     def rehearsal(self) -> Callable[[], None] | None:
-        """Work that compiles what a step needs, which another thread may do; None: nothing has to be compiled."""
+        """Function that compiles what a step needs, and may run in another thread; None: nothing to compile."""
         return None

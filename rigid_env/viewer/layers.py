@@ -1,4 +1,4 @@
-"""Layers of the stage that can be switched: each shows its part of a `Look`, or hides it."""
+"""Layers of the viewer's picture that can be switched: each draws its part of a `Look`, or hides it."""
 
 from __future__ import annotations
 
@@ -15,37 +15,38 @@ from rigid_env.viewer.scenery import Placement, add_walls
 from rigid_env.viewer.shapes import leave, octants
 
 VELOCITY, SPIN = (196, 58, 148), (150, 104, 208)
-"""Colours of arrows of velocity and angular velocity."""
+"""RGB colours of the arrows of velocity and angular velocity."""
 
 DRAG = (44, 54, 74)
 BOUND = (96, 116, 150)
 BOUND_OPACITY = 0.16
 
 POINT = 0.036
-"""Size of a contact point, in units of the largest body."""
+"""Size of a contact point, in extents of the largest body."""
 
 AXIS, AXIS_RADIUS = 0.75, 0.012
-"""Length of an axis in radii of its body, and its radius in units of the largest body."""
+"""Length of a body's axis in diameters of the body, and its radius in extents of the largest body."""
 
 TORQUE_RADIUS, TORQUE_SWEEP, TORQUE_POINTS = 0.62, np.radians(300.0), 32
-"""Arc of a torque: its radius in extents of the body, its largest angle and its points."""
+"""Arc that shows a torque: its radius in extents of the body, its largest angle [rad], and its number of points."""
 
 EARTH = 9.81
-"""[m/s²]. A body that falls by half its size is drawn with an arrow about as long."""
+"""[m/s²] Gravity that scales arrows of velocity: after a fall by half a body's size, the arrow is half as long as the
+body."""
 
 
 class Layer(Protocol):
-    """Part of the picture with a switch."""
+    """Part of the viewer's picture with a switch."""
 
     def show(self, look: Look) -> None:
-        """Draw what is there at a moment."""
+        """Draw this part of a `Look`."""
 
     def hide(self) -> None:
-        """Draw nothing until the next `show`."""
+        """Make this part invisible until the next `show`."""
 
 
 class Walls(Nodes):
-    """Floor and walls of the room; they are added once."""
+    """Floor and walls of the room, which are added once."""
 
     def __init__(self, scene, placement: Placement):
         super().__init__(scene, placement, "/scene/walls")
@@ -56,7 +57,7 @@ class Walls(Nodes):
 
 
 class Contacts(Nodes):
-    """Contact points."""
+    """Contact points, drawn as dots."""
 
     name = "/scene/contacts"
 
@@ -79,7 +80,7 @@ class Contacts(Nodes):
 
 
 class Forces(Arrows):
-    """Arrows of contact forces, in units of the smallest body: those of a block would hide a pebble."""
+    """Arrows of contact forces, scaled by the smallest body, so that forces on a large body do not hide it."""
 
     name = "/scene/forces"
 
@@ -90,13 +91,13 @@ class Forces(Arrows):
 
 
 class Arcs(Lines):
-    """Arcs of torques."""
+    """Arcs that show torques."""
 
     name, colour = "/scene/applied/arc", palette.TORQUE
 
 
 class Applied:
-    """Arrows of the forces that are applied to bodies, from their surfaces, and arcs of the torques round them."""
+    """Arrows of applied forces, from the surfaces of the bodies, and arcs with arrow heads for applied torques."""
 
     def __init__(self, scene, placement: Placement):
         self._force = Arrows(scene, placement, "/scene/applied/force")
@@ -140,7 +141,7 @@ class Velocities(Arrows):
 
 
 class Axes(Nodes):
-    """Axes of the bodies, from the centre of the shape: x red, y green, z blue."""
+    """Body axes, from the centre of each shape: x red, y green, z blue."""
 
     name = "/scene/axes"
     _count = 0
@@ -163,7 +164,7 @@ class Axes(Nodes):
 
 
 class Bounds(Nodes):
-    """Spheres that hold the bodies."""
+    """Translucent spheres that hold the bodies."""
 
     name = "/scene/bounds"
     _count = 0
@@ -187,7 +188,7 @@ class Bounds(Nodes):
 
 
 class Drag(Lines):
-    """Spring from a body to the mouse."""
+    """Coil of the spring from the dragged body to the mouse."""
 
     name, colour = "/scene/drag", DRAG
 
@@ -196,7 +197,7 @@ class Drag(Lines):
 
 
 class Ghost:
-    """The same bodies at the accuracy ``reference``, translucent."""
+    """Translucent bodies of the same scene at the accuracy ``reference``."""
 
     def __init__(self, scene, placement: Placement):
         self._bodies = Bodies(scene, "/scene/ghost", placement, is_ghost=True)
@@ -212,17 +213,23 @@ class Ghost:
 
 
 def force_scale(frame, unit: float) -> float:
-    """Length of a force's arrow [m/N]; `Frame.force_scale` is made for bodies of five metres."""
+    """Length of an arrow per unit of force [m/N].
+
+    `Frame.force_scale` is meant for bodies of 5 m; it is reduced for a smaller `unit`, the extent of a body [m].
+    """
     return frame.force_scale * min(1.0, unit / 5.0)
 
 
 def extent(body: BodyView) -> float:
-    """Largest size of a body along its axes [m]."""
+    """Largest size of a body along its own axes [m]."""
     return float(body.dimensions.max()) * (1.0 if body.kind == "block" else 2.0)
 
 
 def torque_arc(body: BodyView, scaled) -> np.ndarray:
-    """Points (n, 3) [m] of an arc round a body and the axis of a torque; `scaled` (3,) is as long as the arc [m]."""
+    """Points (n, 3) [m] of an arc around a body and the axis of a torque.
+
+    `scaled` (3,) has the direction of the torque, and the length of the arc [m]. A short arc has no points.
+    """
     size = float(np.linalg.norm(scaled))
     radius = TORQUE_RADIUS * extent(body)
     sweep = min(size / radius, TORQUE_SWEEP) if np.isfinite(size) else 0.0

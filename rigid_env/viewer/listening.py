@@ -1,4 +1,4 @@
-"""Listener of a world's steps: which calls were made, what they took, and what happened in them."""
+"""Listener of a world's steps, which records the calls of `World.step`, their computing time and their events."""
 
 from __future__ import annotations
 
@@ -12,23 +12,24 @@ from physics import Event, Status
 from physics.analysis.events import Pair, contact_events, fault_events, last_pushes, logged_events, named
 
 EVENT_ROOM = 128
-"""Events per body and call of a step that are told; more are left out."""
+"""Events that are recorded per body and call; more are left out."""
 
 
 class Call(NamedTuple):
-    """Call of a world's step.
+    """One call of a world's step.
 
     Attributes
     ----------
     wrench : (1, bodies, 6) float64
-        Force [N] and torque [N m], world frame.
+        Command: force [N] and torque [N m], world frame.
     steps : int
+        Steps of the call.
     dt : float
-        Length of one [s].
+        Length of one step [s].
     start : Snapshot or None
-        State before the call, where the world was put there from outside.
+        State before the call, if the world was changed from outside before it; else None.
     past : (1, bodies, 6) float64 or None
-        Force and torque that went past an actuator.
+        Force [N] and torque [N m] that act directly on bodies, not through an actuator.
     """
 
     wrench: np.ndarray
@@ -39,30 +40,30 @@ class Call(NamedTuple):
 
 
 class Listener:
-    """Listener of one world, in the place of its recorder (`physics.world.step_listener.StepListener`).
+    """Recorder of the calls of one world's step (`physics.world.step_listener.StepListener`).
 
-    It must be made before the world is stepped by a `Stepper`, which binds the log of events.
+    It must be made before any `Stepper` steps the world, since a stepper binds the log of events when it is made.
 
     Parameters
     ----------
     world : World
-        Of one world.
+        Batch of one world.
 
     Attributes
     ----------
     calls : list of Call
-        Since `begin`, and so are the others.
+        Calls since `begin`; the next four attributes are of these calls, too.
     events : list of Event
     seconds : float
-        Time that the calls took [s].
+        Computing time [s].
     penetration, residual : float
-        The largest of any call [m], [1].
+        Largest penetration [m] and residual [1].
     fault : str
         Message of the last fault; empty without one.
     pushes : dict
         Contacts after the last call, and when each last pushed: `physics.analysis.events.last_pushes`.
     is_changed : bool
-        The world was changed from outside since the last call.
+        True if the world was changed from outside since the last call.
     """
 
     def __init__(self, world: physics.World):
@@ -75,25 +76,25 @@ class Listener:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the calls so far."""
+        """Forget all recorded calls, with their computing time, events and faults."""
         self.calls: list[Call] = []
         self.events: list[Event] = []
         self.seconds = self.penetration = self.residual = 0.0
         self.fault = ""
 
     def resume(self, pushes: dict[Pair, float]) -> None:
-        """Forget the calls so far: the world was put into a state with these `pushes`, and goes on from there."""
+        """Forget the calls so far, after the world was restored to a state with these `pushes`."""
         self.begin()
         self.pushes, self.is_changed = pushes, False
 
-    # --- told by the world ---------------------------------------------------------------------------------
+    # --- called by the world -------------------------------------------------------------------------------
 
     def changed(self, worlds: np.ndarray | slice) -> None:
-        """The world was changed from outside."""
+        """Note that the world was changed from outside."""
         self.is_changed = True
 
     def before(self, wrench: np.ndarray, steps: int, dt: float) -> None:
-        """A call is about to be made."""
+        """Record a call of the world's step that is about to be made."""
         start = self._world.snapshot() if self.is_changed else None
         self.is_changed = False
         past = None if self._world.actuation is None else self._world.actuation.past
@@ -102,7 +103,7 @@ class Listener:
         self._clock = time.perf_counter()
 
     def after(self) -> None:
-        """It has been made."""
+        """Record computing time, events and faults of the call that has just been made."""
         self.seconds += time.perf_counter() - self._clock
         world, report = self._world, self._world.report
         events = logged_events(world, self._from)
@@ -116,5 +117,5 @@ class Listener:
             self.fault = report.messages()[0]
 
     def undone(self) -> None:
-        """It is none: an exception has put everything back."""
+        """Remove the last call, after an exception in it has restored the world."""
         self.calls.pop()

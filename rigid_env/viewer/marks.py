@@ -1,4 +1,4 @@
-"""Marks on the stage of what a task or a scene declares: the goal, and wind, fluids and springs."""
+"""Marks for what a task or a scene declares: the goal, and wind, fluids and springs."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from rigid_env.viewer.shapes import rim, world_point
 CORNERS = 64
 DISC_OPACITY = 0.25
 RING = 0.05
-"""Width of the disc's ring, in its radii."""
+"""Width of the ring around the goal's disc, in radii of the disc."""
 
 LIFT = 0.004
-"""Height of the disc over the floor, in units of the largest body."""
+"""Height of the goal's disc above the floor, in extents of the largest body."""
 
 FACE_SHARE, FACE_LIFT = 0.22, 1.008
 
@@ -32,7 +32,7 @@ FLUID_OPACITY = 0.22
 
 
 def _sheet(scene, name: str, vertices, faces, colour, opacity):
-    """Node of triangles that are seen from both sides and have no shadow."""
+    """Add a node of triangles to viser's scene that can be seen from both sides and cast no shadow."""
     return scene.add_mesh_simple(
         name, vertices, faces, color=colour, opacity=opacity, flat_shading=True, side="double", cast_shadow=False,
         receive_shadow=False,
@@ -43,7 +43,7 @@ def _sheet(scene, name: str, vertices, faces, colour, opacity):
 
 
 class Goal:
-    """Disc and face of a `GoalView`; made anew when another face or colour is shown, else moved."""
+    """Disc and face that show the goal of a task (`GoalView`); another face or colour needs new nodes."""
 
     def __init__(self, scene, placement: Placement):
         self._scene, self._placement = scene, placement
@@ -64,7 +64,7 @@ class Goal:
             self._show_face(goal, bodies[0])
 
     def hide(self) -> None:
-        """Draw nothing until the next `show`."""
+        """Remove the nodes until the next `show`."""
         for node in (*self._disc, self._face):
             if node is not None:
                 node.remove()
@@ -103,14 +103,14 @@ def _circle(radius: float) -> np.ndarray:
 
 
 def _disc():
-    """Triangles of a disc of radius 1 across y."""
+    """Vertices and triangles of a disc of radius 1 across the y axis."""
     here = np.arange(CORNERS)
     faces = np.stack([np.full(CORNERS, CORNERS), np.roll(here, -1), here], axis=1)
     return np.concatenate([_circle(1.0), np.zeros((1, 3))]), faces
 
 
 def _ring():
-    """Triangles of its ring."""
+    """Vertices and triangles of a ring across the y axis, with the outer radius 1 and the width `RING`."""
     a = np.arange(CORNERS)
     b = np.roll(a, -1)
     faces = np.concatenate([np.stack([a, a + CORNERS, b], 1), np.stack([b, a + CORNERS, b + CORNERS], 1)])
@@ -122,15 +122,16 @@ def _ring():
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """One field to be drawn.
+    """Mark of one field of a scene: an arrow, a plane or a spring.
 
     Parameters
     ----------
     label : str
+        Text at the mark.
     direction : (3,) float or None
-        Of an arrow, world frame; its length does not count.
+        Direction of the arrow, world frame; its length has no meaning.
     surface : (normal, offset) or None
-        Plane normal·x = offset [m] of a fluid.
+        Surface of a fluid: the plane normal·x = offset [m].
     spring : physics.Spring or None
     """
 
@@ -141,7 +142,7 @@ class Mark:
 
 
 def field_marks(scene: Scene) -> tuple[Mark, ...]:
-    """Marks of a scene's wind, fluids and springs; the other fields have no place or direction.
+    """Marks of a scene's wind, fluids and springs; other fields have no place or direction to draw.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def field_marks(scene: Scene) -> tuple[Mark, ...]:
 
 
 def spring_ends(spring: Spring, scene: Scene, bodies) -> tuple[np.ndarray, np.ndarray]:
-    """Ends (3,) and (3,) [m] of a spring on bodies of a frame, world frame."""
+    """Ends (3,) and (3,) of a spring of a scene, world frame [m]; `bodies` are the `BodyView` of a picture."""
     start = _on_body(spring.body, spring.point, scene, bodies)
     if spring.other is None:
         return start, np.asarray(spring.anchor, dtype=float)
@@ -172,25 +173,26 @@ def spring_ends(spring: Spring, scene: Scene, bodies) -> tuple[np.ndarray, np.nd
 
 
 def _on_body(index: int, point, scene: Scene, bodies) -> np.ndarray:
-    """Point of a body from its centre of mass, body frame; a `BodyView` stands at the centre of the shape."""
+    """Point of body `index` in the world frame (3,) [m], given from its centre of mass in the body frame."""
     return world_point(bodies[index], np.subtract(point, scene.bodies[index].center))
 
 
 class Springs(Lines):
-    """Coils of a scene's springs."""
+    """Coils that show a scene's springs."""
 
     name, colour = "/scene/fields/springs", SPRING
 
 
 class Fields(Nodes):
-    """Marks of a scene's fields.
+    """Marks of a scene's wind, fluids and springs.
 
     Parameters
     ----------
     scene : viser.SceneApi
     placement : Placement
+        Scale and origin of the drawing.
     fields : physics.Scene or None
-        None has none.
+        Scene that has the fields; None: no marks.
     """
 
     name = "/scene/fields"
@@ -203,7 +205,7 @@ class Fields(Nodes):
         self._arrows = Arrows(scene, placement, f"{self._name}/flow")
 
     def show(self, look: Look) -> None:
-        """Draw the marks; springs follow their bodies."""
+        """Draw the marks of the fields; springs follow the bodies of a `Look`."""
         if not self._marks:
             return
         if not self._nodes:
@@ -219,20 +221,20 @@ class Fields(Nodes):
         self._springs.draw(np.concatenate(coils) if coils else ())
 
     def hide(self) -> None:
-        """Draw nothing until the next `show`."""
+        """Make the marks invisible until the next `show`."""
         super().hide()
         self._arrows.hide()
         self._springs.hide()
 
     def _place(self, mark: Mark) -> np.ndarray:
-        """Start (3,) [m] of a mark's arrow: high in the room, one below the other."""
+        """Start (3,) of a mark's arrow, world frame [m]: near the top of the room, each arrow below the one before."""
         room, order = self._placement.room, self._marks.index(mark)
         middle = 0.5 * (room.lower + room.upper)
         middle[1] = room.upper[1] - 0.15 * (1 + order) * self._placement.unit
         return middle
 
     def _add(self, mark: Mark):
-        """Node of a mark that does not move, or None."""
+        """Add a node for the part of a mark that does not move to viser's scene; None if there is no such part."""
         name = f"{self._name}/{self._marks.index(mark)}"
         if mark.direction is not None:
             return self._scene.add_label(

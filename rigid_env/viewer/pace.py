@@ -1,71 +1,71 @@
-"""Real time of a run: the pace at which it is owed to it, and the cost of its steps."""
+"""Pace of a run compared with real time, and computing time of its steps."""
 
 from __future__ import annotations
 
 import math
 
 CALL_WEIGHT, STEP_WEIGHT = 0.1, 0.05
-"""Weights of the newest call in the pace, and of the newest step in the cost; the earlier ones fade with them."""
+"""Weights of the newest call in the mean pace and of the newest step in the mean cost; older ones fade."""
 
 TOLD = 0.9
-"""Share of the speed below which a run does not keep up."""
+"""Share of the requested speed below which the user is told that the run cannot keep up."""
 
 ROUNDING = 1e-9
-"""Share of a step that may be missing from it."""
+"""Share of a step that may still be missing when the step is taken."""
 
 MICROSECONDS = 1e6
 
 
 class Pace:
-    """Simulated time that is due.
+    """Simulated time that a run must still advance to keep up with real time.
 
     Attributes
     ----------
     speed : float
-        Simulated seconds per real second.
+        Requested simulated seconds per real second.
     due : float
-        [s].
+        Simulated time that is due [s].
     """
 
     def __init__(self):
         self.speed, self.due, self._share = 1.0, 0.0, 1.0
 
     def owe(self, seconds: float) -> None:
-        """Add real time [s]."""
+        """Add `seconds` of real time to the time that is due."""
         self.due += seconds * self.speed
 
     def is_due(self, interval: float) -> bool:
-        """True if a step of this length [s] is to be taken."""
+        """True if a step of the length `interval` [s] is due."""
         return self.due >= interval * (1.0 - ROUNDING)
 
     def leave_out(self, wanted: float) -> None:
-        """Drop all that is due still, of the time that was `wanted` [s]."""
+        """Drop the time that is still due, out of `wanted` [s] that were due before."""
         self._note(1.0 - self.due / wanted)
         self.due = 0.0
 
     def keep_up(self) -> None:
-        """Note that nothing was left out."""
+        """Note that all due time was simulated."""
         self._note(1.0)
 
     def _note(self, share: float) -> None:
         self._share += CALL_WEIGHT * (share - self._share)
 
     def stop(self) -> None:
-        """Owe nothing."""
+        """Set the due time to 0, and forget earlier delays."""
         self.due, self._share = 0.0, 1.0
 
     @property
     def message(self) -> str:
-        """The speed that is reached; empty if that is nearly all."""
+        """Text with the speed that is reached; empty if it is nearly the requested one."""
         if self._share >= TOLD:
             return ""
         return f"cannot keep up: speed {self._share * self.speed:.2g} instead of {self.speed:g}"
 
 
 class Cost:
-    """Time of computing per simulated second, a mean weighted to the latest steps.
+    """Computing time per simulated second, as a mean with larger weights for later steps.
 
-    The first step is left out: it binds the kernel.
+    The first step is left out, since it also binds the kernel.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Cost:
         self.value, self._steps = math.nan, 0
 
     def add(self, seconds: float, interval: float) -> None:
-        """Add a step of `interval` simulated seconds that took `seconds`."""
+        """Add a step of `interval` simulated seconds that took `seconds` of computing time."""
         self._steps += 1
         if self._steps == 1:
             return

@@ -1,4 +1,4 @@
-"""Panel of controls beside the picture: what the user does goes to the session, what the session does is shown."""
+"""Panel of controls beside the picture: it passes the user's changes to the session, and shows the session's state."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 SLIDERS = {"gravity": ("gravity [m/s²]", 0.0, 30.0, 0.01), "friction": ("friction", 0.0, 2.0, 0.01),
            "restitution": ("restitution", 0.0, 1.0, 0.01)}  # fmt: skip
 ROOM = "the room"
-"""Target of the camera that follows no body."""
+"""Entry of the camera's menu that means: follow no body."""
 
 KICK = 1.0
-"""Change of a body's speed by a kick at first [m/s]."""
+"""Change of a body's speed by a click, before the user changes it [m/s]."""
 
 ROWS = 8
-"""Events that are in sight."""
+"""Events that the list shows at once."""
 
 
 class Panel:
-    """Controls of a viewer.
+    """Controls of a viewer, as elements of viser's page.
 
     Parameters
     ----------
@@ -33,13 +33,14 @@ class Panel:
     session : Session
     stage : Stage
     post : callable
-        Takes what is to be done in the thread of the session: callbacks come in threads of the server.
+        Takes a function and runs it in the session's thread. Callbacks need it, since they run in threads of the
+        server.
     """
 
     def __init__(self, gui, session: Session, stage: Stage, post: Callable[[Callable[[], Any]], None]):
         self._gui, self._session, self._stage, self._post = gui, session, stage, post
-        self._pending: list[Any] = []  # controls whose new value the session has not got yet
-        self._told: dict[tuple[int, str], Any] = {}  # properties of controls as the page has them
+        self._pending: list[Any] = []  # controls whose new value has not reached the session yet
+        self._told: dict[tuple[int, str], Any] = {}  # properties of controls as the page shows them
         self._status = gui.add_markdown("")
         self._sliders: dict[str, Any] = {}
         self._accuracy = None
@@ -59,11 +60,11 @@ class Panel:
 
     @property
     def kick_speed(self) -> float:
-        """Change of a body's speed by a click on it [m/s]; 0: a click does nothing."""
+        """Change of a body's speed by a click on it [m/s]; 0: a click has no effect."""
         return self._kick.value if self._session.can.drag and self._kicks.value else 0.0
 
     def show(self) -> None:
-        """Bring numbers and texts up to date, with what compiles, and where the time is."""
+        """Update all controls, plots and texts from the state of the session."""
         session = self._session
         text = self._cost_text()
         self._put(self._status, "content", "  \n".join(filter(None, (session.message, text))) or "ready")
@@ -80,7 +81,7 @@ class Panel:
         self._events.show(session.events)
 
     def _put(self, handle, name: str, value) -> None:
-        """Set a property where the session has changed it; what the user has just set stays, told or not yet."""
+        """Set property `name` of a control if the session has changed its value; the user's latest input stays."""
         key = id(handle), name
         if self._told.get(key) == value or any(handle is each for each in self._pending):
             return
@@ -142,7 +143,7 @@ class Panel:
         return button
 
     def _when(self, handle, act: Callable[[Any], Any]) -> None:
-        """Do something with the new value of a control that the user has changed."""
+        """Call `act` with the new value of a control whenever the user has changed it."""
 
         @handle.on_update
         def _(event) -> None:
@@ -157,7 +158,7 @@ class Panel:
         act(value)
 
     def _cost_text(self) -> str:
-        """Tell what accuracy costs, in a line or two."""
+        """Text of one to three lines with the computing time at this accuracy, and at the ghost's."""
         samples, session = self._session.samples, self._session
         if not len(samples) or not session.accuracy:
             return ""
@@ -180,13 +181,13 @@ def _number(value: float) -> str:
 
 
 class EventList:
-    """The latest events, newest first, and a slider to earlier ones.
+    """The latest events, newest first, with a slider to earlier ones.
 
     Parameters
     ----------
     gui : viser.GuiApi
     go_to : callable
-        Takes the time of an event [s].
+        Called with the time of an event that was clicked [s].
     """
 
     def __init__(self, gui, go_to: Callable[[float], None]):
@@ -200,7 +201,7 @@ class EventList:
             row.on_click(lambda _, k=k: self._times[k] is not None and go_to(self._times[k]))
 
     def show(self, events: Sequence[Event]) -> None:
-        """Bring the list up to date."""
+        """Update the list from all events so far."""
         if len(events) == len(self._events) and all(new is old for new, old in zip(events[-1:], self._events[-1:])):
             return
         self._events = list(events)
@@ -227,7 +228,7 @@ class EventList:
 
 
 def told(event: Event) -> str:
-    """One line about an event."""
+    """Text of one line about an event: time, kind, body, and the other body or the wall."""
     other = event.other_name or f"body {event.other}"
     where = f", {other}" if event.other >= 0 else f", wall {event.wall}" if event.wall >= 0 else ""
     return f"{event.t:.3f} s  {event.kind}: {event.name or f'body {event.body}'}{where}"

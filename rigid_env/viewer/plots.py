@@ -1,4 +1,4 @@
-"""Plots beside the picture: energy, momentum, penetration, residual, and what accuracy costs."""
+"""Plots beside the picture: energy, momentum, penetration, residual, distance from the reference, computing cost."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from rigid_env.viewer.history import Samples
 
 POINTS = 400
-"""Points of a line at most: longer runs are thinned."""
+"""Most points of a line; longer runs are thinned."""
 
 SMALLEST = 1e-16
-"""Stands in for zero where powers of ten are drawn."""
+"""Number that replaces smaller ones before a logarithm."""
 
 LEAST = 2
-"""Samples from which on there is a line."""
+"""Fewest samples for which a line is drawn."""
 
 FONT = "11px sans-serif"
 
@@ -25,20 +25,21 @@ COLOURS = ("#1c7ed6", "#e8590c", "#2b8a3e")
 
 @dataclass(frozen=True)
 class Plot:
-    """One plot.
+    """Description of one plot over time.
 
     Parameters
     ----------
     title : str
-        With the unit.
+        Title with the unit.
     columns : tuple of str
-        Of `Samples`.
+        Columns of `Samples`, one line each.
     factor : float
-        From the unit of the columns to that of the title: the page writes numbers with three decimals at most.
+        Factor from the unit of the columns to the unit of the title; the page shows numbers with at most three
+        decimals.
     is_log : bool
-        The axis is logarithmic: for a few decades.
+        True: the axis is logarithmic, for numbers within a few decades.
     is_power : bool
-        Powers of ten are drawn, on a linear axis: for many decades.
+        True: the axis is linear and shows log₁₀ of the numbers, for many decades.
     """
 
     title: str
@@ -59,13 +60,13 @@ PLOTS = (
 
 
 class Plots:
-    """All plots of `PLOTS` that have a line, brought up to date together.
+    """All plots of `PLOTS` for which there are enough samples.
 
     Parameters
     ----------
     gui : viser.GuiApi
     folder : viser.GuiFolderHandle
-        Holds them.
+        Folder of the page that holds the plots.
     """
 
     def __init__(self, gui, folder):
@@ -74,7 +75,7 @@ class Plots:
         self._shown: tuple[int, float] = (0, 0.0)
 
     def show(self, samples: Samples) -> None:
-        """Draw the samples; nothing is sent where there are no new ones."""
+        """Draw the samples; nothing is sent to the page if there are no new ones."""
         state = len(samples), float(samples.time[-1]) if len(samples) else 0.0
         if self._shown == state:
             return
@@ -84,7 +85,7 @@ class Plots:
             self._draw(plot, *drawn(plot, samples, every))
 
     def _draw(self, plot: Plot, columns: tuple[str, ...], data: tuple[np.ndarray, ...]) -> None:
-        """Give a plot its data; it is made anew where other columns are known than before."""
+        """Set the data of a plot; the plot is made anew if the set of its known columns has changed."""
         before, handle = self._handles.get(plot, ((), None))
         if columns == before:
             if columns:
@@ -97,9 +98,10 @@ class Plots:
 
 
 def drawn(plot: Plot, samples: Samples, every: np.ndarray) -> tuple[tuple[str, ...], tuple[np.ndarray, ...]]:
-    """Columns of a plot that are known, and its data: times [s] from when the first is known, and a line of each.
+    """Columns of a plot that have enough finite samples, and its data: times [s] and a line of values for each column.
 
-    The page draws nothing at all on a linear axis if a line begins with NaN.
+    `every` has the indices of the samples to draw. Times start where the first column is finite, since a line that
+    begins with NaN hides the whole plot on a linear axis.
     """
     lines = {name: line(getattr(samples, name)[every], plot) for name in plot.columns}
     known = {name: np.isfinite(values) for name, values in lines.items()}
@@ -111,14 +113,14 @@ def drawn(plot: Plot, samples: Samples, every: np.ndarray) -> tuple[tuple[str, .
 
 
 def thinned(count: int, most: int) -> np.ndarray:
-    """Indices of at most `most` of `count` samples, evenly spread, the last one among them."""
+    """Indices of at most `most` of `count` samples, evenly spread, with the last sample among them."""
     if count <= most:
         return np.arange(count)
     return np.unique(np.linspace(0, count - 1, most).round().astype(np.int64))
 
 
 def line(values: np.ndarray, plot: Plot) -> np.ndarray:
-    """(n,) float64 to draw in a plot; of powers of ten, that of zero stands at the bottom."""
+    """Values (n,) float64 as they are drawn in a plot: in its unit, and as log₁₀ if `Plot.is_power`."""
     values = plot.factor * values
     return np.log10(np.maximum(values, SMALLEST)) if plot.is_power else values
 

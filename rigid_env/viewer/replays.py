@@ -1,4 +1,4 @@
-"""Subjects whose course is known: a recording, which is simulated again, and a saved trajectory."""
+"""Subjects whose motion is known: a recording, which is simulated again, and a saved trajectory."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ from rigid_env.viewer.worlds import WorldSubject
 
 
 class PlayedRecording(WorldSubject):
-    """Recording whose calls are made again; the user cannot act in it.
+    """Recording that is simulated again, call by call; the user cannot change it.
 
     Parameters
     ----------
     recording : physics.Recording
-        Of at least one call.
+        Recording of at least one call of `World.step`.
     name : str
+        Short name for titles.
     """
 
     can = Can(ghost=True)
@@ -40,7 +41,7 @@ class PlayedRecording(WorldSubject):
 
     @property
     def time(self) -> float:
-        """Time of the first world, and from then on the sum of the steps [s]: a reset does not set it back."""
+        """Time of the first state plus all steps since [s]; a reset within the recording does not set it back."""
         return float(self._times[self._call])
 
     @property
@@ -53,7 +54,7 @@ class PlayedRecording(WorldSubject):
 
     @property
     def end(self) -> float:
-        """The time after the last call [s]."""
+        """Time after the last call [s]."""
         return float(self._times[-1])
 
     @property
@@ -62,7 +63,7 @@ class PlayedRecording(WorldSubject):
 
     @property
     def message(self) -> str:
-        """Why it was kept."""
+        """Reason for which the recording was kept."""
         return f"recorded: {self._recording.reason}"
 
     def restart(self, seed: int) -> None:
@@ -77,7 +78,7 @@ class PlayedRecording(WorldSubject):
         if (steps, dt) not in self._steppers:
             self._steppers[steps, dt] = physics.Stepper(self.world, steps, dt)
         stepper = self._steppers[steps, dt]
-        stepper.wrench[0] = recording.wrenches[k]  # as it was: `World.step` would refuse one that is not finite
+        stepper.wrench[0] = recording.wrenches[k]  # not by `World.step`, which refuses a wrench that is not finite
         with recording.past_actuator(self.world, k):
             stepper()
         self._call += 1
@@ -100,13 +101,14 @@ class PlayedTrajectory(Subject):
     Parameters
     ----------
     trajectory : physics.Trajectory
-        With its scene.
+        Trajectory with its scene.
     name : str
+        Short name for titles.
 
     Raises
     ------
     ValueError
-        It does not know its scene.
+        The trajectory has no scene.
     """
 
     def __init__(self, trajectory: physics.Trajectory, name: str):
@@ -138,7 +140,7 @@ class PlayedTrajectory(Subject):
 
     @property
     def end(self) -> float:
-        """The time of the last sample [s]."""
+        """Time of the last sample [s]."""
         return float(self._trajectory.t[-1])
 
     @property
@@ -193,7 +195,7 @@ def _radius(body: physics.Body) -> float:
 
 
 def _view(body: physics.Body, pos: np.ndarray, quat: np.ndarray) -> BodyView:
-    """Picture of a body whose centre of mass is at `pos`."""
+    """View of a body for pictures, from the position `pos` of its centre of mass [m] and its attitude `quat`."""
     dimensions = 2.0 * body.dimensions if body.kind == "block" else body.dimensions
     outline = {} if body.kind != "hull" else {"corners": body.polyhedron.vertices, "faces": body.polyhedron.loops}
     centre = pos + rotation_matrices(quat) @ np.array(body.center)

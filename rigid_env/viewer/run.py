@@ -1,4 +1,4 @@
-"""Run of a subject: steps with their samples and events, inputs of the user, and the way back."""
+"""Run of a subject: its steps with samples and events, inputs of the user, and the return to earlier moments."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from rigid_env.viewer.interface import Subject
 from rigid_env.viewer.pace import MICROSECONDS, Cost
 
 MOST_EVENTS = 100_000
-"""Events that are kept; later ones are left out."""
+"""Events that a run keeps; later ones are left out."""
 
 PATIENCE = 1.0
-"""Time that a ghost may take to follow to a moment of the past [s]; a slower one starts anew there."""
+"""Computing time that a ghost may take to follow the run to an earlier moment [s]; beyond it the ghost starts anew
+there."""
 
 
 class Kept(NamedTuple):
-    """State before a step."""
+    """State of a run before a step: of the subject, the user's hand and the ghost."""
 
     subject: Any
     hand: Hand
@@ -28,9 +29,9 @@ class Kept(NamedTuple):
 
 
 class Run:
-    """Run of a subject from its start, or from where it was restarted.
+    """Run of a subject from its start.
 
-    The future of a moment is known until something else is done there: a step or an input.
+    The run can return to an earlier moment. Later steps stay known there until a new step or input replaces them.
 
     Parameters
     ----------
@@ -39,15 +40,16 @@ class Run:
     Attributes
     ----------
     index : int
-        Steps from the start to now.
+        Steps from the start to the present moment.
     samples : Samples
-        One at the start and one after each step.
+        One sample at the start and one after each known step.
     events : list of Event
-        Up to the latest moment that is known.
+        Events of all known steps.
     ghost : Ghost or None
     hand : Hand
+        Spring and kicks of the user.
     fault : str
-        Message about the last step; empty if all was well.
+        Message about the last step; empty if there was no fault.
     """
 
     def __init__(self, subject: Subject):
@@ -61,7 +63,7 @@ class Run:
         self._sample()
 
     def restart(self, seed: int) -> None:
-        """Begin anew; the ghost goes along. After an error of a user's function all is as it was."""
+        """Begin the run anew, with the ghost; after an error in a user's function everything is as before."""
         before = self.subject.snapshot()
         try:
             self.subject.restart(seed)
@@ -74,13 +76,13 @@ class Run:
 
     @property
     def known_events(self) -> list[Event]:
-        """Events up to the present moment, a copy."""
+        """Copy of the events up to the present moment."""
         return self.events[: self.history.event_counts[self.index]]
 
-    # --- onward ------------------------------------------------------------------------------------------------
+    # --- new steps ---------------------------------------------------------------------------------------------
 
     def take(self) -> None:
-        """Take a new step; what came after this moment is forgotten."""
+        """Take a new step; steps that were known after this moment are forgotten."""
         subject, history = self.subject, self.history
         self._forget()
         if history.is_due(self.index):
@@ -98,7 +100,7 @@ class Run:
         self._sample()
 
     def _step(self, record: Any = None) -> Any:
-        """One step of the subject, with the hand in it."""
+        """Take one step of the subject with the user's forces, a new one or that of a `record`; returns its record."""
         world = self.subject.world
         load = None if world is None else self.hand.load(world, self.subject.interval)
         record = self.subject.step(load, record)
@@ -106,12 +108,12 @@ class Run:
         return record
 
     def _follow(self) -> None:
-        """Let the ghost take the step, too; one that cannot goes away."""
+        """Let the ghost take the step that the subject has just taken; remove a ghost that fails, and set `fault`."""
         if self.ghost is None:
             return
         try:
             self.ghost.follow(self.subject.listener.calls)
-        except Exception as error:  # of a user's field, or a recorded wrench that is not finite
+        except Exception as error:  # a user's force field fails, or a recorded wrench is not finite
             self.ghost, self.fault = None, f"the ghost stopped: {error}"
 
     def _sample(self) -> None:
@@ -123,7 +125,7 @@ class Run:
         self.samples.append(**values)
 
     def _forget(self) -> None:
-        """Forget all that came after this moment; inputs that were given at it stay."""
+        """Forget everything after the present moment; inputs at this moment stay."""
         self.history.forget(self.index)
         self.samples.truncate(self.index + 1)
         del self.events[self.history.event_counts[self.index] :]
@@ -131,13 +133,15 @@ class Run:
     # --- inputs ------------------------------------------------------------------------------------------------
 
     def give(self, name: str, *arguments: Any) -> None:
-        """Do something that belongs to the run, and note it; after an error nothing has changed.
+        """Apply an input of the user, and note it in the history; after an error nothing has changed.
 
         Parameters
         ----------
         name : str
             ``drag`` (body, point, target), ``release``, ``kick`` (body, impulse), one of `worlds.SLIDERS` (value), or
             ``accuracy`` (name).
+        arguments
+            Arguments in the parentheses above.
         """
         done = Input(name, arguments)
         self._apply(done)
@@ -160,17 +164,17 @@ class Run:
             if self.ghost is not None:
                 self.ghost.take_parameters(self.subject.world)
 
-    # --- back --------------------------------------------------------------------------------------------------
+    # --- return to known moments -------------------------------------------------------------------------------
 
     def go_to(self, index: int, anew: bool = False) -> None:
-        """Be at a known moment, bit for bit as it was.
+        """Return to a known moment, bit for bit.
 
         Parameters
         ----------
         index : int
-            Steps from the start, up to the latest.
+            Steps from the start to that moment, at most the number of known steps.
         anew : bool
-            The present state is not to be trusted.
+            True if the present state may be wrong, so that a kept state is restored in any case.
         """
         entry = self.history.before(index)
         if entry is None or (index == self.index and not anew):
@@ -186,7 +190,10 @@ class Run:
         self._repeat(first, index, is_following)
 
     def _repeat(self, first: int, last: int, is_following: bool) -> None:
-        """Take recorded steps again, from the state at `first`."""
+        """Repeat recorded steps, from the state before step `first` to the state before step `last`.
+
+        `is_following` lets the ghost take them, too; otherwise the ghost starts anew at the end.
+        """
         for k in range(first, last):
             self._step(self.history.records[k])
             if is_following:
@@ -201,10 +208,10 @@ class Run:
             self._apply(given)
 
     def _put_ghost(self, kept: Any, steps: int) -> bool:
-        """Let the ghost go on from what was kept of it; False: it starts anew where the run goes to."""
+        """Restore the ghost's kept state, unless `steps` steps of the ghost take too long; returns whether it did."""
         if self.ghost is None or kept is None:
             return False
-        cost = self.ghost.cost.value * self.subject.interval / MICROSECONDS  # of a step [s]
+        cost = self.ghost.cost.value * self.subject.interval / MICROSECONDS  # computing time of a step [s]
         if steps and not np.nan_to_num(cost) * steps <= PATIENCE:
             return False
         self.ghost.restore(kept)

@@ -1,4 +1,4 @@
-"""Scenery: the room of a scene, placed before viser's camera, its light, background, floor and walls of finite size."""
+"""Scenery of the viewer: placement of a scene before viser's camera, light, background, floor and walls."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from rigid_env.rendering.layout import FADE_LENGTH, Room, default_camera, is_flo
 from rigid_env.viewer.interface import Look
 
 SIGHT = 12.0
-"""Distance [drawn units] of the camera at first: viser's shadows reach 20 units, and a scene has any size."""
+"""Distance of the camera from its target at first [drawn units]; viser's shadows reach 20 units in any scene."""
 
 WINDOW = (1000, 640)
-"""[px]. A window of which all of the room is in sight."""
+"""[px] Window in which the whole room is visible at first."""
 
 SUN, SKY = 1.9, 1.1
-"""Strengths of the lamp and of the light from all sides."""
+"""Strengths of the directional lamp and of the light from all sides."""
 
 SKY_COLOUR, GROUND_COLOUR = (255, 255, 255), (196, 204, 218)
 
 WALL_OPACITY, OUTLINE_WIDTH = 0.5, 0.012
-"""The latter in drawn units."""
+"""Opacity of a wall, and width of its outline [drawn units]."""
 
 CELLS = 5
-"""Lines of the floor from one strong line to the next."""
+"""Cells of the floor's grid from one strong line to the next."""
 
 FLOOR_SHADOW = 0.3
 FADE_STRENGTH = 0.6
@@ -36,22 +36,23 @@ SHADE, SHADE_DISTANCE, SHADE_REACH = 0.02, 40.0, 9.0
 """Strength and distance of the lamp that casts shadows, and the radius that it lights [drawn units]."""
 
 SATURATION = 1.6
-"""Exponent by which the weaker channels of a colour are made weaker: viser's tone mapping pales every colour."""
+"""Exponent that weakens the smaller channels of a colour, because viser's tone mapping makes all colours paler."""
 
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Part of space that is shown, and how large it is drawn.
+    """Transformation from a scene's coordinates to the coordinates that viser draws.
 
     Parameters
     ----------
     room : Room
+        Part of space that is shown.
     camera : Camera
-        At first.
+        First camera.
     origin : (3,) float
-        Drawn in the middle [m].
+        Point that is drawn at the origin, world frame [m].
     scale : float
-        Drawn units of a metre.
+        Drawn units per metre.
     """
 
     room: Room
@@ -61,27 +62,27 @@ class Placement:
 
     @property
     def unit(self) -> float:
-        """Extent of the largest body [m]: arrows and lines grow with it."""
+        """Extent of the largest body [m], by which arrows and lines are scaled."""
         return self.room.fade / FADE_LENGTH
 
     def drawn(self, points):
-        """Points (..., 3) [m] of the world as they are drawn, float32."""
+        """Convert points (..., 3) of the world [m] to drawn points, float32."""
         return ((np.asarray(points) - self.origin) * self.scale).astype(np.float32)
 
     def world(self, points) -> np.ndarray:
-        """Drawn points (..., 3) as points of the world [m]."""
+        """Convert drawn points (..., 3) to points of the world [m]."""
         return np.asarray(points, dtype=float) / self.scale + self.origin
 
 
 def place(look: Look, bounds=None) -> Placement:
-    """Place a scene as the software renderer does: all of its room in sight.
+    """Choose a placement with the whole room of a scene in view, as the software renderer does.
 
     Parameters
     ----------
     look : Look
-        At any time; bodies that are in it are in sight.
+        State of the scene at any time; its bodies are in view.
     bounds : pair of (3,) float, optional
-        Lower and upper corner of a box to be in sight, too [m].
+        Lower and upper corner of a box that is in view, too [m].
 
     Returns
     -------
@@ -105,17 +106,17 @@ def place(look: Look, bounds=None) -> Placement:
 
 
 def vivid(colours) -> np.ndarray:
-    """Colours (..., 3) sRGB, 0..255, richer in proportion; grey stays grey; uint8."""
+    """Make sRGB colours (..., 3), 0 to 255, more saturated; greys stay the same. Returns uint8."""
     colours = np.asarray(colours, dtype=float)
     strongest = np.maximum(colours.max(axis=-1, keepdims=True), 1.0)
     return np.rint(strongest * (colours / strongest) ** SATURATION).astype(np.uint8)
 
 
 def light(scene) -> None:
-    """Light the scene as `rendering.palette` does: from the sun and the sky, with shadows on floors.
+    """Light viser's scene as `rendering.palette` does: from the sun and the sky, with shadows on floors.
 
-    Shadows come from one weak spot. viser's shadows of a light from afar take three maps of the scene, each as large
-    as the spot's: drawn without a GPU, a picture takes ten times as long.
+    A weak spotlight casts the shadows. Shadows of a directional light would take three maps of the scene, each as large
+    as the spotlight's, and without a GPU a picture would take ten times as long.
     """
     scene.configure_default_lights(enabled=False)
     scene.configure_environment_map(None)
@@ -131,17 +132,17 @@ def light(scene) -> None:
 
 
 def paint_background(scene) -> None:
-    """Paint the background of `rendering.palette`, lighter above."""
+    """Paint the background with the colours of `rendering.palette`, lighter at the top."""
     down = np.linspace(0.0, 1.0, 64)[:, None, None]
     top, bottom = np.array(palette.BACKGROUND_TOP), np.array(palette.BACKGROUND_BOTTOM)
     scene.set_background_image(np.rint(top + down * (bottom - top)).astype(np.uint8), format="png")
 
 
 def add_walls(scene, root: str, placement: Placement) -> list:
-    """Add the walls of a placement's room.
+    """Add the walls of a placement's room to viser's scene.
 
-    A floor is a grid that fades out and carries shadows. Other walls are translucent from inside and an outline from
-    outside, so that none hides the bodies.
+    A floor is a grid that fades out and shows shadows. Other walls are translucent from inside and only an outline from
+    outside, so that no wall hides the bodies.
 
     Returns
     -------
@@ -176,7 +177,7 @@ def _add_floor(scene, name, corners, normal, placement: Placement):
 
 
 def turn_to_normal(normal) -> np.ndarray:
-    """Unit quaternion (4,), scalar first, of the rotation that takes y to a normal (3,), and x near the world's."""
+    """Unit quaternion (4,), w first, of a rotation that turns y to a normal (3,), with x near the world's x axis."""
     return _turn_to(np.stack(_axes(np.asarray(normal)), axis=1))
 
 
@@ -194,7 +195,7 @@ def _add_pane(scene, name, corners, is_floor: bool) -> list:
 
 
 def _axes(normal):
-    """Axes of a floor's plane and its normal between them, x, y and z of the grid: along the world's where they can."""
+    """Axes x, y and z of a floor's grid: y is the normal, and x is near the world's x axis."""
     x = np.array((1.0, 0.0, 0.0)) - normal[0] * normal
     x /= np.linalg.norm(x)
     return x, normal, np.cross(x, normal)
@@ -208,7 +209,7 @@ def _is_rectangle(corners, normal) -> bool:
 
 
 def _turn_to(axes) -> np.ndarray:
-    """Unit quaternion (4,), scalar first, of the rotation with these columns.
+    """Unit quaternion (4,), w first, of the rotation matrix `axes` (3, 3).
 
     It is the eigenvector of the largest eigenvalue of a symmetric matrix (Bar-Itzhack 2000).
     """

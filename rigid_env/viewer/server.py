@@ -1,4 +1,4 @@
-"""Viewer: a session in a browser, in real time."""
+"""Viewer: shows a session in a browser, in real time."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from rigid_env.viewer.session import Session
 from rigid_env.viewer.stage import Stage
 
 FPS = 60.0
-"""Pictures a second at most [1/s]."""
+"""Most pictures per second [1/s]."""
 
 TEXTS = 5.0
-"""Times a second at which numbers, plots and lists are brought up to date [1/s]."""
+"""Updates of numbers, plots and lists per second [1/s]."""
 
 
 class Viewer:
-    """A session in a browser: server, picture and panel.
+    """Session in a browser: the server, the picture and the panel of controls.
 
     Parameters
     ----------
     session : Session
     server : viser.ViserServer
-        Of `rigid_env.viewer.servers.start_viewer_server`; it ends with the viewer.
+        Server from `rigid_env.viewer.servers.start_viewer_server`; the viewer stops it at the end.
 
     Attributes
     ----------
     address : str
-        Where it is served.
+        Address of the page.
     """
 
     def __init__(self, session: Session, server):
@@ -53,7 +53,7 @@ class Viewer:
         self._drawn: float | None = None
 
     def play_once_seen(self) -> None:
-        """Let time go on as soon as a browser is there, so that nobody misses the start; later ones change nothing."""
+        """Start playing when the first browser connects, so that the user sees the start."""
         self._server.on_client_connect(self._see)
 
     def _see(self, _client) -> None:
@@ -62,7 +62,7 @@ class Viewer:
             self._inbox.put(self._session.play)
 
     def run(self) -> None:
-        """Serve until `stop`, or Ctrl-C."""
+        """Serve the page until `stop` or Ctrl-C."""
         self._is_running = True
         before = texts = time.perf_counter()
         try:
@@ -80,7 +80,7 @@ class Viewer:
             self.close()
 
     def turn(self, seconds: float) -> bool:
-        """Do what users want, let time go on by `seconds` [s], and draw; whether there was something to draw."""
+        """Carry out the user's inputs, advance by `seconds` of real time, and draw; True if anything has changed."""
         is_new = self._answer()
         is_new = self._session.advance(seconds) > 0 or is_new
         look_time = self._session.time
@@ -90,22 +90,22 @@ class Viewer:
         return is_new
 
     def stop(self) -> None:
-        """Let `run` end; from any thread."""
+        """End `run`, from any thread."""
         self._is_running = False
 
     def close(self) -> None:
-        """End the server."""
+        """Stop the server."""
         self._is_running = False
         stop_server(self._server)
 
     def _rest(self, since: float) -> None:
-        """Wait for the next picture."""
+        """Sleep until the next picture is due; `since` is the time of the last one [s]."""
         left = since + 1.0 / FPS - time.perf_counter()
         if left > 0.0:
             time.sleep(left)
 
     def _answer(self) -> bool:
-        """Do what was posted. Whether there was anything."""
+        """Call the functions that callbacks have posted; returns whether there were any."""
         is_any = False
         while True:
             try:
@@ -116,7 +116,7 @@ class Viewer:
             self._guarded(act)
 
     def _guarded(self, act: Callable[[], Any]) -> None:
-        """Do something; a mistake of the user, or an error in a function of the user's, is told in the page."""
+        """Call a function, and show an error on the page instead of raising it."""
         try:
             act()
         except ValueError as error:
@@ -146,5 +146,5 @@ class Viewer:
 
 
 def _mass(session: Session, body: int) -> float:
-    """[kg]."""
+    """Mass of a body [kg]."""
     return float(1.0 / session.subject.world.params[body, at.INV_MASS])

@@ -1,6 +1,6 @@
-"""Servers of viser that print nothing: their banner does not tell how to reach them from elsewhere.
+"""Start and stop servers of viser without its banner, which does not say how other machines reach the page.
 
-A server can be up before there is anything to show: the browser loads the page meanwhile, which takes as long.
+A server can start before there is anything to show, so that the browser loads the page while kernels compile.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from rigid_env.extras import require
 LOOPBACK = "127.0.0.1"
 
 PORT = 8080
-"""Port at which a viewer listens."""
+"""Default port of a viewer."""
 
 PORTS, LAST_PORT = 1000, 65_535
-"""Ports that are tried, one after the other, and the last one that there is."""
+"""Number of ports that are tried one after the other, and the largest port."""
 
 
 def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
@@ -31,14 +31,15 @@ def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
     host : str
         Address to listen at; the default is reached from this machine only.
     port : int
-        0 takes any that is free; another one that is taken, the next free one. `get_port` of the server tells.
+        First port to try; if it is taken, the next free one is used. 0: any free port. The server's `get_port` returns
+        it.
     label : str, optional
-        Head of the panel.
+        Title of the panel.
 
     Returns
     -------
     viser.ViserServer
-        To be ended by `stop_server`.
+        `stop_server` stops it.
 
     Raises
     ------
@@ -56,7 +57,7 @@ def start_server(host: str = LOOPBACK, port: int = 0, label: str | None = None):
 
 
 def free_port(host: str, port: int) -> int:
-    """First port from `port` on that is free; 0 stays 0. viser itself would wait for ever where there is none.
+    """First free port from `port` on; 0 stays 0. Without a free port, viser itself would wait forever.
 
     Raises
     ------
@@ -76,28 +77,28 @@ def free_port(host: str, port: int) -> int:
 
 
 def _bind(host: str, port: int) -> None:
-    """Take a port, and let go of it."""
+    """Bind a socket to a port and close it; an OSError if the port is taken."""
     family, *_ = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     with socket.socket(family) as taken:
-        if os.name == "posix":  # as asyncio does: a port that was let go of a moment ago
+        if os.name == "posix":  # as asyncio does, so that a port closed a moment ago counts as free
             taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         taken.bind((host, port))
 
 
 def start_viewer_server(name: str, host: str = LOOPBACK, port: int = PORT):
-    """Start the server of a viewer, whose page says that something is being opened.
+    """Start the server of a viewer, whose page shows at first that something is being opened.
 
     Parameters
     ----------
     name : str
-        What is being opened.
+        Name of the subject that is being opened.
     host, port
         As of `start_server`.
 
     Returns
     -------
     viser.ViserServer
-        For `rigid_env.viewer.server.Viewer`.
+        Server for `rigid_env.viewer.server.Viewer`.
 
     Raises
     ------
@@ -114,14 +115,14 @@ def start_viewer_server(name: str, host: str = LOOPBACK, port: int = PORT):
 
 
 def address_of(server) -> str:
-    """Address of a server as it is reached from this machine."""
+    """Address of a server's page, as a browser on this machine opens it."""
     host = server.get_host()
     shown = "localhost" if host in (LOOPBACK, "localhost", "::1") else host
     return f"http://{shown}:{server.get_port()}"
 
 
 def directions(server) -> list[str]:
-    """Lines that say where a viewer is, and how to reach it from another machine."""
+    """Lines of text with the address of a viewer, and how to reach it from another machine."""
     lines, port = [f"viewer      {address_of(server)}"], server.get_port()
     if server.get_host() == LOOPBACK:
         lines.append(f"over SSH    ssh -L {port}:localhost:{port} THIS_MACHINE, then open http://localhost:{port}")
@@ -129,14 +130,14 @@ def directions(server) -> list[str]:
 
 
 def stop_server(server) -> None:
-    """End a server; connections are closed."""
+    """Stop a server and close its connections."""
     with _hushed():
         server.stop()
 
 
 @contextmanager
 def server_for_a_while(host: str = LOOPBACK) -> Iterator:
-    """Server that ends with the block, at any free port."""
+    """Context manager for a server at any free port, which is stopped at the end of the block."""
     server = start_server(host)
     try:
         yield server
@@ -146,7 +147,7 @@ def server_for_a_while(host: str = LOOPBACK) -> Iterator:
 
 @contextmanager
 def _hushed() -> Iterator[None]:
-    """Leave out lines that go to rich's own console, as those of viser do whatever `verbose` is."""
+    """Context manager that suppresses output to rich's console, where viser prints even if `verbose` is False."""
     console = rich.get_console()
     before, console.quiet = console.quiet, True
     try:

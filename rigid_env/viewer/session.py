@@ -1,4 +1,4 @@
-"""Session: a subject that is played, with its past, its samples, the user's hand and a ghost beside it."""
+"""Session: a subject that is being played, with its history, samples, the user's hand and a ghost."""
 
 from __future__ import annotations
 
@@ -12,31 +12,33 @@ from rigid_env.viewer.interface import Look, Subject
 from rigid_env.viewer.pace import Pace
 
 BUDGET = 0.05
-"""Time of computing after which a call of `Session.advance` takes no further step [s]."""
+"""Computing time after which a call of `Session.advance` takes no further step [s]."""
 
 
 class Session(Controls):
     """Player of a subject; used from one thread only.
 
-    Kernels compile in the background. Until then `is_compiling` is True, and the run stands still at its start, or
-    goes on as it was. Errors of a simulation pause it and stand in `message`.
+    Kernels compile in the background, while `is_compiling` is True. Until the kernel for the start is compiled, the run
+    stays at its start. Until another kernel is compiled, the run continues without it. An error of the simulation
+    pauses the run, and its text is in `message`.
 
     Parameters
     ----------
     subject : Subject
-        Of `rigid_env.viewer.subject.open_subject`; its sessions are one at a time.
+        Subject from `rigid_env.viewer.subject.open_subject`, which only one session may use at a time.
 
     Attributes
     ----------
     subject : Subject
     is_playing : bool
+        Whether `advance` takes steps.
     """
 
     def __init__(self, subject: Subject):
         super().__init__(subject)
         self._pace = Pace()
 
-    # --- to be read --------------------------------------------------------------------------------------------
+    # --- present state -----------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -45,7 +47,7 @@ class Session(Controls):
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last time that `seek` goes to [s]."""
+        """First and last time [s] that `seek` can go to."""
         times, end = self._run.history.times, self.subject.end
         return times[0], times[-1] if end is None else end
 
@@ -65,24 +67,24 @@ class Session(Controls):
 
     @property
     def samples(self) -> Samples:
-        """One at the start and one after each step, up to the latest that is known."""
+        """Samples of the run: one at the start and one after each known step."""
         return self._run.samples
 
     @property
     def events(self) -> list[Event]:
-        """Events up to now, a copy."""
+        """Copy of the events up to the present time."""
         return self._run.known_events
 
     @property
     def message(self) -> str:
-        """One line about the state of affairs."""
+        """Text of one line for the user: an error, a compilation in progress, a delay, or a message of the subject."""
         if self._note:
             return self._note
         compiling = f"compiling {', '.join(self._jobs)} ..." if self._jobs else ""
         return "; ".join(filter(None, (compiling, self._pace.message, self.subject.message)))
 
     def look(self) -> Look:
-        """Everything to draw of now."""
+        """Everything to draw of the present state, with the user's spring and the ghost."""
         run, subject = self._run, self.subject
         drag = None if subject.world is None else run.hand.ends(subject.world)
         ghost = None if run.ghost is None else run.ghost.frame()
@@ -91,24 +93,24 @@ class Session(Controls):
     # --- time --------------------------------------------------------------------------------------------------
 
     def play(self) -> None:
-        """Let time go on with `advance`."""
+        """Let `advance` take steps from now on."""
         self.is_playing, self._note = True, ""
         self._pace.stop()
 
     def pause(self) -> None:
-        """Stand still."""
+        """Let `advance` take no steps."""
         self.is_playing = False
 
     def step(self) -> bool:
-        """Take one step; returns False at the end, while the scene compiles, and after an error."""
+        """Take one step; returns False without a step at the end, while the scene compiles, and after an error."""
         self._poll()
         self._note = ""
         return self._take()
 
     def advance(self, seconds: float) -> int:
-        """Take the steps that are due after `seconds` of real time; returns how many were taken.
+        """Take the steps that are due after `seconds` of real time; returns their number.
 
-        After `BUDGET` those that are left are left out, and `message` says so.
+        Steps that are not taken within `BUDGET` are dropped, and `message` says that the run cannot keep up.
         """
         self._poll()
         if not self.is_playing or START in self._jobs:
@@ -128,9 +130,10 @@ class Session(Controls):
         return count
 
     def seek(self, time: float) -> None:
-        """Go to the last known moment that is not later than `time` [s], bit for bit; where the end is known, to any.
+        """Go to the latest known moment that is not after `time` [s], bit for bit.
 
-        What came later is forgotten once a step is taken, or an input given, from there.
+        A subject with a known end also takes new steps up to `time`. At an earlier moment, later ones stay known until
+        a step or an input there replaces them.
         """
         time = validation.number(time, "time")
         self._poll()
@@ -145,17 +148,17 @@ class Session(Controls):
                 break
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin anew, with the sliders where they are; an error of a user's function stands in `message` instead.
+        """Begin the run anew, with the sliders as they are; an error of a user's function stands in `message` instead.
 
         Parameters
         ----------
         seed : int, optional
-            Of the first episode and of random actions; None: the same as before.
+            Seed of the first episode and of random actions; None: the same as before.
 
         Raises
         ------
         ValueError
-            It is no seed.
+            A value that is no seed.
         """
         seed = self.seed if seed is None else validation.index(seed, 2**32, "seed")
         self._poll()
@@ -167,7 +170,7 @@ class Session(Controls):
             self._run.give(name, value)
 
     def _take(self) -> bool:
-        """Take a step; what is wrong with it is told."""
+        """Take a step, and put a fault of it into the message; returns False if no step was taken."""
         if START in self._jobs:
             return False
         if self.subject.is_over:
@@ -180,7 +183,10 @@ class Session(Controls):
         return True
 
     def _safely(self, work) -> bool:
-        """Do something that calls functions of users; an error pauses the run at the last whole moment."""
+        """Call a function that may call a user's code; an error pauses the run and restores the present moment.
+
+        Returns False after an error.
+        """
         try:
             work()
         except Exception as error:

@@ -1,4 +1,4 @@
-"""Shapes of bodies: the triangles that are drawn, rims and octants of two shades, and the rays that meet them."""
+"""Shapes of bodies for the viewer: triangles with rims or octants in two shades, and intersections with rays."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ SUBDIVISIONS = 10
 """Subdivisions of each octant of a round body's mesh."""
 
 RIM_SHARE = 0.035
-"""Width of a rim: part of the way from a corner of a face to its middle."""
+"""Width of a rim, as a share of the distance from a face's corner to its middle."""
 
 RIM_LIFT = 1.002
-"""Size of a rim relative to its body, so that it lies on top."""
+"""Size of a rim relative to its body: slightly larger, so that it is drawn on top."""
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Triangles of one colour.
+    """Part of a body's surface: triangles of one colour.
 
     Parameters
     ----------
     vertices : (v, 3) float32
-        Body frame; of a hull [m], of the others to be stretched by the dimensions.
+        Corners, body frame: of a hull in [m], of other shapes to be multiplied by the body's dimensions.
     faces : (f, 3) uint32
-        Counter-clockwise as seen from outside.
+        Indices of each triangle's corners, counter-clockwise as seen from outside.
     lightening : float
-        Part of the way from the body's colour to white.
+        Share of white that is mixed with the body's colour.
     is_flat : bool
-        Whether faces are flat, or stand for a round surface.
+        Whether faces are shaded flat; False: they approximate a round surface.
     is_rim : bool
-        Whether it is drawn on another part, and casts no shadow.
+        Whether it lies on another part and casts no shadow.
     """
 
     vertices: np.ndarray
@@ -50,7 +50,7 @@ class Part:
 
 
 def shape_key(body: BodyView):
-    """Hashable: bodies of equal keys have the same parts."""
+    """Hashable key of a body's shape; bodies with equal keys have the same parts."""
     if body.kind == "hull":
         return body.corners.tobytes(), body.faces
     return "block" if body.kind == "block" else "round"
@@ -58,7 +58,7 @@ def shape_key(body: BodyView):
 
 @lru_cache(maxsize=256)
 def parts(key) -> tuple[Part, ...]:
-    """Parts of the bodies with a `shape_key`."""
+    """Parts of all bodies with a key from `shape_key`."""
     if key == "block":
         mesh = block_mesh((1.0, 1.0, 1.0))
         return solid(mesh), rim(mesh.vertices, BLOCK_FACES.tolist())
@@ -69,12 +69,12 @@ def parts(key) -> tuple[Part, ...]:
 
 
 def solid(mesh: Mesh) -> Part:
-    """All of a polyhedron."""
+    """Whole surface of a polyhedron as one part."""
     return Part(mesh.vertices.astype(np.float32), _triangles(mesh.faces))
 
 
 def octants() -> tuple[Part, Part]:
-    """The octants of a sphere of radius 1, every second one lighter: its rotation can be seen."""
+    """Octants of a sphere of radius 1, in two parts: every second octant is lighter, which makes rotation visible."""
     mesh = ellipsoid_mesh((1.0, 1.0, 1.0), SUBDIVISIONS)
     sides = []
     for is_odd in (False, True):
@@ -86,15 +86,16 @@ def octants() -> tuple[Part, Part]:
 
 
 def rim(corners, polygons: Sequence[Sequence[int]], share: float = RIM_SHARE, lift: float = RIM_LIFT) -> Part:
-    """Ring along the edges of each face of a convex polyhedron that holds the origin.
+    """Part with a ring along the edges of each face of a convex polyhedron that contains the origin.
 
     Parameters
     ----------
     corners : (n, 3) float
+        Corners of the polyhedron.
     polygons : sequence of sequences of int
-        Corners of the faces, counter-clockwise.
+        Indices of the corners of each face, counter-clockwise.
     share : float
-        Width of the ring: part of the way from the corners to their mean.
+        Width of the ring, as a share of the distance from each corner to the mean of the face's corners.
     lift : float
         Factor by which all corners are moved away from the origin.
     """
@@ -114,7 +115,7 @@ def rim(corners, polygons: Sequence[Sequence[int]], share: float = RIM_SHARE, li
 
 
 def _triangles(faces: np.ndarray) -> np.ndarray:
-    """Faces (m, k) as triangles, (m (k - 2), 3) uint32."""
+    """Triangles (m (k - 2), 3) uint32 of m faces with k corners each."""
     return np.concatenate([faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]).astype(np.uint32)
 
 
@@ -122,23 +123,23 @@ def _triangles(faces: np.ndarray) -> np.ndarray:
 
 
 def body_point(body: BodyView, point) -> np.ndarray:
-    """Point (3,) [m] of the world in a body's frame, from `BodyView.pos`."""
+    """Convert a point (3,) of the world [m] to a body's frame with the origin `BodyView.pos`."""
     return (np.asarray(point, dtype=float) - body.pos) @ rotation_matrix(body.quat)
 
 
 def world_point(body: BodyView, point_body) -> np.ndarray:
-    """Point (3,) [m] of a body's frame, from `BodyView.pos`, in the world."""
+    """Convert a point (3,) of a body's frame with the origin `BodyView.pos` [m] to the world."""
     return body.pos + rotation_matrix(body.quat) @ np.asarray(point_body, dtype=float)
 
 
 def hit(body: BodyView, origin, direction) -> np.ndarray | None:
-    """Point (3,) [m] where a ray enters a body, or leaves it where it starts inside; None where it misses.
+    """Point (3,) where a ray enters a body, or leaves it if it starts inside; world frame [m]. None if it misses.
 
     Parameters
     ----------
     body : BodyView
     origin, direction : (3,) float
-        World frame [m]; the direction has any length.
+        Start of the ray [m], and its direction of any length, world frame.
     """
     origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
     inside = _stay(body, body_point(body, origin), direction @ rotation_matrix(body.quat))
@@ -148,13 +149,13 @@ def hit(body: BodyView, origin, direction) -> np.ndarray | None:
 
 
 def leave(body: BodyView, direction) -> np.ndarray:
-    """Point (3,) [m] where a ray from the middle of a body leaves it; the middle for a direction of no length."""
+    """Point (3,) [m] where a ray from the centre of a body leaves it; the centre for a direction of zero length."""
     found = hit(body, body.pos, direction) if np.any(direction) else None
     return body.pos if found is None else found
 
 
 def _stay(body: BodyView, origin, direction):
-    """First and last s for which origin + s direction is in a body, in its frame; None where there is none."""
+    """First and last s for which origin + s direction, in the body's frame, is in the body; None if there is no s."""
     if body.kind in ("sphere", "ellipsoid"):
         return _stay_in_ball(origin / body.dimensions, direction / body.dimensions)
     normals, offsets = _planes(body)
@@ -168,7 +169,7 @@ def _stay(body: BodyView, origin, direction):
 
 
 def _stay_in_ball(origin, direction):
-    """Roots s of |origin + s direction|² = 1."""
+    """Both roots s of |origin + s direction|² = 1; None if there are none."""
     a, b, c = direction @ direction, origin @ direction, origin @ origin - 1.0
     root = b * b - a * c
     if root < 0.0 or a == 0.0:
@@ -177,7 +178,7 @@ def _stay_in_ball(origin, direction):
 
 
 def _planes(body: BodyView):
-    """Outward normals (m, 3) and offsets (m,) [m] of the faces of a block or a hull, body frame."""
+    """Outward normals (m, 3) and offsets (m,) [m] of the face planes of a block or a hull, body frame."""
     if body.kind == "block":
         return np.concatenate([np.eye(3), -np.eye(3)]), 0.5 * np.concatenate([body.dimensions, body.dimensions])
     mesh = hull_mesh(tuple(map(tuple, body.corners.tolist())), body.faces)

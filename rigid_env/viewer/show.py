@@ -1,4 +1,4 @@
-"""Show anything that can be played: in a notebook as a page within it, elsewhere in a browser."""
+"""Show anything that the viewer can play: in a notebook as a page within it, elsewhere in a browser."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from rigid_env.viewer.session import Session
 from rigid_env.viewer.subject import open_subject
 
 DURATION, FRAMES = 10.0, 30.0
-"""Duration of an exported run [s] and its pictures per second [1/s]."""
+"""Duration of an exported run [s], and its pictures per second [1/s]."""
 
 
 def looks(session: Session, duration: float) -> Iterator[Look]:
-    """Looks of a session from now on, one after each step, up to `duration` [s] later, or its end."""
+    """Play a session from now on, and yield a `Look` after each step, up to `duration` [s] later or to its end."""
     session.wait()
     start = session.time
     yield session.look()
@@ -32,13 +32,13 @@ def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float 
     ----------
     x : object
         A `physics.Scene`, `World`, `Trajectory` or `Recording`, an environment, the name of a canonical scene, an
-        environment's id, or the path of a file; as of `rigid_env.viewer.subject.open_subject`.
+        environment's id, or the path of a file; see `rigid_env.viewer.subject.open_subject`.
     path : str or Path
-        Of the file.
+        Path of the HTML file.
     duration : float
-        Simulated time at most [s].
+        Longest simulated time [s].
     fps : float
-        Pictures a second at most [1/s].
+        Most pictures per second [1/s].
     **settings
         ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller`` of `open_subject`; ``layers`` and ``title`` of
         `rigid_env.viewer.export.page_of`.
@@ -46,7 +46,7 @@ def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float 
     Returns
     -------
     Path
-        The file.
+        Path of the file.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def to_html(x: Any, path: str | Path, *, duration: float = DURATION, fps: float 
 
 
 def _page(session: Session, duration: float, **of_page: Any) -> str:
-    """Page of a session from now on."""
+    """HTML page of a session from now on, up to `duration` [s]; `of_page` are arguments of `export.page_of`."""
     from rigid_env.viewer import export
 
     subject = session.subject
@@ -76,25 +76,25 @@ def _page(session: Session, duration: float, **of_page: Any) -> str:
 def show(
     x: Any, *, host: str = "127.0.0.1", port: int = 8080, block: bool = True, duration: float = DURATION, **settings
 ) -> Any:
-    """Show something: in a notebook as a page with a time line, elsewhere in a viewer that the browser opens.
+    """Show something: in a notebook as a page with a time line, elsewhere in a viewer whose page a browser opens.
 
     Parameters
     ----------
     x : object
-        As of `to_html`. A world or an environment is copied, and stays as it is.
+        As of `to_html`. A world or an environment is copied, and stays unchanged.
     host, port : str, int
-        Where the viewer is served; of no use in a notebook.
+        Address and port of the viewer's server; ignored in a notebook.
     block : bool
-        Serve until Ctrl-C. False: in a thread, and the viewer is returned; its `stop` ends it.
+        True: serve until Ctrl-C. False: serve in a thread and return the viewer; its `stop` ends it.
     duration : float
-        In a notebook: simulated time [s].
+        Longest simulated time in a notebook [s].
     **settings
-        ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller``.
+        ``accuracy``, ``dt``, ``seed``, ``policy``, ``controller`` of `rigid_env.viewer.subject.open_subject`.
 
     Returns
     -------
     object
-        In a notebook what displays the page; else the `Viewer`.
+        In a notebook an object that displays the page; else the `Viewer`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Stage: looks drawn with viser, in layers that are switched by name, and bodies that can be picked."""
+"""Picture of the viewer: draws looks into viser's scene, in named layers, and reports clicks and drags of bodies."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ LAYERS = {
     "walls": True, "contacts": True, "forces": True, "applied": True, "velocities": False, "axes": False,
     "bounds": False, "sleeping": True, "goal": True, "fields": True, "drag": True, "ghost": True,
 }  # fmt: skip
-"""Names of all layers, and whether they are shown at first."""
+"""Names of all layers, and whether each is shown by default."""
 
 
 class Stage:
-    """Draw looks into the scene of a viser server, whoever is connected.
+    """Picture of a simulation in the scene of a viser server, for every browser that is connected.
 
-    Used from one thread. `show` sends only what has changed.
+    Used from one thread. `show` sends only changes.
 
     Parameters
     ----------
     server : viser.ViserServer
     fields : physics.Scene, optional
-        Its wind, fluids and springs are drawn.
+        Scene whose wind, fluids and springs are drawn.
     bounds : pair of (3,) float, optional
-        Lower and upper corner of a box to be in sight from the start [m].
+        Lower and upper corner of a box that is in view from the start [m].
     """
 
     def __init__(self, server, fields: Scene | None = None, bounds=None):
@@ -51,7 +51,7 @@ class Stage:
         scenery.paint_background(self._scene)
 
     def show(self, look: Look) -> None:
-        """Draw a `Look`. With other walls than before the room is made anew, and the camera stays."""
+        """Draw a `Look`; if its walls differ from the last look's, the room is made anew, and the camera stays."""
         with self._server.atomic():
             if self._walls != _walls_of(look):
                 self._make_room(look)
@@ -64,12 +64,12 @@ class Stage:
         self._server.flush()
 
     def set_layer(self, name: str, is_on: bool) -> None:
-        """Switch a layer of `LAYERS`.
+        """Switch a layer of `LAYERS` on or off.
 
         Raises
         ------
         ValueError
-            On a name that is none of `LAYERS`.
+            If the name is not in `LAYERS`.
         """
         self._is_on[validation.one_of(name, LAYERS, "layer")] = bool(is_on)
         if self._look is None:
@@ -81,16 +81,16 @@ class Stage:
         self.show(self._look)
 
     def has_layer(self, name: str) -> bool:
-        """True if a layer of `LAYERS` is switched on; a ValueError as of `set_layer`."""
+        """True if a layer of `LAYERS` is switched on; raises a ValueError for another name."""
         return self._is_on[validation.one_of(name, LAYERS, "layer")]
 
     def follow(self, body: int | None) -> None:
-        """Keep a body where it is in the picture, from now on; None keeps the room.
+        """Keep a body at its place in the picture from now on; None: keep the room at its place.
 
         Raises
         ------
         ValueError
-            On an index that is not of a body in the last look.
+            If the last look has no body with this index.
         """
         if body is not None:
             body = validation.index(body, 0 if self._look is None else len(self._look.frame.bodies), "body")
@@ -99,25 +99,27 @@ class Stage:
             self.show(self._look)
 
     def on_drag(self, callback: Callable[[str, int, np.ndarray, np.ndarray], None]) -> None:
-        """Have drags of bodies by the left button reported; camera moves start beside the bodies.
+        """Set the function that is called when the user drags a body with the left button.
+
+        Drags that start beside the bodies move the camera.
 
         Parameters
         ----------
         callback : callable
             ``(phase, body, point_body, target)``: "start", "update" or "end"; index of the body; the point that was
-            grabbed, in the body's frame from `BodyView.pos` [m]; where the mouse is, at the depth of the point, world
-            frame [m]. Called in the thread of the server: keep it short.
+            grabbed, in the body's frame from `BodyView.pos` [m]; the place of the mouse at the depth of that point,
+            world frame [m]. It is called in the server's thread: keep it short.
         """
         self._on_drag = callback
 
     def on_click(self, callback: Callable[[int, np.ndarray, np.ndarray], None]) -> None:
-        """Have clicks on bodies reported.
+        """Set the function that is called when the user clicks on a body.
 
         Parameters
         ----------
         callback : callable
-            ``(body, point, direction)``: index of the body; the point of its surface, world frame [m]; unit vector of
-            the line of sight. Called in the thread of the server: keep it short.
+            ``(body, point, direction)``: index of the body; the clicked point of its surface, world frame [m]; unit
+            vector of the line of sight. It is called in the server's thread: keep it short.
         """
         self._on_click = callback
 
@@ -153,7 +155,7 @@ class Stage:
         self._server.on_client_connect(self._aim_early)
 
     def _aim_early(self, client) -> None:
-        """Aim a browser that may have connected before the camera was known: only new ones follow it by themselves."""
+        """Set the camera of a browser that connected before the camera was known; viser sets it only for later ones."""
         camera = self._server.initial_camera
         with client.atomic():
             client.camera.fov = camera.fov
@@ -161,7 +163,7 @@ class Stage:
             client.camera.up_direction = camera.up
 
     def _center(self, look: Look) -> None:
-        """Move the whole scene so that the followed body stays in the middle of its room."""
+        """Shift the whole scene horizontally so that the followed body stays in the middle of the picture."""
         shift = np.zeros(3)
         if self._followed is not None and self._followed < len(look.frame.bodies):
             shift = -self.placement.drawn(look.frame.bodies[self._followed].pos)
@@ -171,7 +173,7 @@ class Stage:
     # --- picking -------------------------------------------------------------------------------------------
 
     def _watch(self, node, members: np.ndarray) -> None:
-        """Report drags and clicks of the bodies in a new node."""
+        """Report drags and clicks on the bodies in a new node; `members` has the indices of these bodies."""
 
         async def dragged(event) -> None:
             self._drag(event.phase, int(members[event.instance_index or 0]), event)
@@ -204,10 +206,10 @@ class Stage:
             self._on_click(body, point, direction)
 
     def _world(self, point) -> np.ndarray:
-        """Point (3,) of viser's world in that of the scene [m]."""
+        """Convert a point (3,) of viser's scene to the world frame [m]."""
         return self.placement.world(np.asarray(point, dtype=float) - self._root.position)
 
 
 def _walls_of(look: Look):
-    """Hashable: looks with equal ones share a room."""
+    """Hashable key of a look's walls; looks with equal keys share a room."""
     return tuple((*wall.normal.tolist(), wall.offset) for wall in look.frame.walls)

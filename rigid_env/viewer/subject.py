@@ -1,4 +1,4 @@
-"""From a name, a file or an object to a subject that can be played."""
+"""Make a subject for the viewer from a name, a file or an object."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMES = (
     "a canonical scene, a scene file (.toml, .xml or .urdf), the id of an environment, 'module:Class' of a task, a "
     "recording and a trajectory (.npz)"
 )
-"""Texts that name a subject: all that can be typed in a shell."""
+"""Kinds of text that name a subject in a shell, for errors."""
 
 OBJECTS = "physics.Scene, World, Trajectory, Recording and environments of rigid_env"
 
@@ -38,25 +38,27 @@ def open_subject(
     policy: Any = None,
     controller: bool = False,
 ) -> Subject:
-    """Make a subject of anything that can be played.
+    """Make a subject, which the viewer can play, from a name, a file or an object.
 
     Parameters
     ----------
     what : object
         Name of a canonical scene, path of a scene file, of a recording or of a trajectory, id of an environment; or a
         `physics.Scene`, `World`, `Trajectory`, `Recording`, or an environment of `rigid_env`, wrapped or not. A world
-        or an environment goes on from its present state in a copy; it stays as it is.
+        or an environment is copied; the copy continues from its present state.
     accuracy : str or physics.Accuracy, optional
-        None: that of a world or an environment; of others ``balanced``.
+        Accuracy of the simulation. None: a world or an environment keeps its own, a scene gets ``balanced``.
+        Not for a recording or a trajectory.
     dt : float, optional
-        Step of a scene or a world [s]. None: 0.01, or that of a world. Environments have steps of their own.
+        Step of a scene or a world [s]. None: a world keeps its own, a scene gets 0.01. Not for an environment, a
+        recording or a trajectory.
     seed : int
-        Of the first episode and of random actions.
+        Seed of the first episode and of random actions.
     policy : path, callable or model, optional
-        Of an environment: a file (`rigid_env.envs.policy_files.load_policy`), a function from observations with the
-        worlds first to actions, or a model of Stable-Baselines3. None: random actions.
+        Policy for an environment: a file (`rigid_env.envs.policy_files.load_policy`), a function from observations to
+        actions, both with the worlds first, or a model of Stable-Baselines3. None: random actions.
     controller : bool
-        Let the controller written by hand for this environment act (`rigid_env.envs.controllers`).
+        True: the handwritten controller for this environment acts (`rigid_env.envs.controllers`).
 
     Returns
     -------
@@ -65,7 +67,7 @@ def open_subject(
     Raises
     ------
     ValueError
-        Something else, a file with a mistake, or an argument that this subject does not take.
+        Something that cannot be played, a file with a mistake, or an argument that this subject does not take.
     gymnasium.error.DependencyNotInstalled
         A policy of Stable-Baselines3 without the extra `agents`.
     """
@@ -88,7 +90,10 @@ def open_subject(
 
 
 def _refuse(name: str, why: str, **given: Any) -> None:
-    """Refuse arguments that a subject does not take; those that are None were not given."""
+    """Raise a ValueError if an argument is given (is not None) that the subject called `name` does not take.
+
+    `why` completes the sentence "`name` is ...".
+    """
     for field, value in given.items():
         if value is not None:
             value = str(value) if isinstance(value, os.PathLike) else value
@@ -96,7 +101,7 @@ def _refuse(name: str, why: str, **given: Any) -> None:
 
 
 def _loaded(what: Any) -> tuple[Any, str]:
-    """Scene, world, trajectory, recording, environment or its id, and a name for it."""
+    """Load what a name or path means; returns an object or an environment's id, and a title. Objects stay."""
     if isinstance(what, (str, os.PathLike)):
         return _of_text(os.fspath(what))
     known = (physics.Scene, physics.World, physics.Trajectory, physics.Recording)
@@ -125,7 +130,7 @@ def _of_text(text: str) -> tuple[Any, str]:
 
 
 def _of_archive(path: Path) -> physics.Recording | physics.Trajectory:
-    """Recording or trajectory of a file."""
+    """Recording or trajectory in the archive at a path."""
     allowed = "allowed are what physics.Recorder and Trajectory.to_npz write"
     if not is_zipfile(path):
         raise ValueError(f"what is {str(path)!r}, which is no archive; {allowed}")
@@ -168,7 +173,7 @@ def _open_environment(what, name, accuracy, dt, seed, policy, controller) -> Sub
 
 
 def _policy(env, policy, controller):
-    """Function from observations to actions; None: random actions."""
+    """Function from observations to actions for an environment; None: random actions."""
     if controller:
         return _controller(env, policy)
     if isinstance(policy, (str, os.PathLike)):
@@ -191,7 +196,7 @@ def _id_of(env) -> str:
 
 
 def _controller(env, policy):
-    """The controller written by hand for an environment."""
+    """Handwritten controller of an environment, as a policy."""
     from rigid_env.envs.controllers import CONTROLLERS, load_controller
 
     if policy is not None:

@@ -1,4 +1,4 @@
-"""Subjects that are simulated in a world, those of them in which the user acts, and a world alone."""
+"""Subjects that are simulated in a world, those in which the user can act, and a world without an environment."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from rigid_env.viewer.interface import Can, Look, Subject
 from rigid_env.viewer.listening import Listener
 
 DOWN = np.array((0.0, -1.0, 0.0))
-"""Direction of gravity in a scene that has none."""
+"""Direction of gravity in a scene without gravity."""
 
 SLIDERS = {
     "gravity": validation.non_negative, "friction": validation.non_negative, "restitution": validation.share,
 }  # fmt: skip
-"""Parameters that the user changes, and the check of each."""
+"""Parameters that the user can change, and the function that checks a value of each."""
 
 
 class Moment(NamedTuple):
-    """All that decides how a subject goes on, the accuracy included."""
+    """Everything that decides how a subject continues, accuracy included."""
 
     accuracy: str
     state: Any
@@ -36,18 +36,19 @@ class Moment(NamedTuple):
 
 
 class WorldSubject(Subject):
-    """A subject that is simulated in `world`, to which `listener` listens.
+    """Subject that is simulated in `world`, whose steps `listener` records.
 
     Parameters
     ----------
     world : World
-        Its own, of one world.
+        Batch of one world, which only this subject uses.
     name : str
+        Short name for titles.
     """
 
     world: physics.World
     listener: Listener
-    _shift = 0.0  # from times of the world to those of the subject [s]
+    _shift = 0.0  # time of the subject minus time of the world [s]
 
     def __init__(self, world: physics.World, name: str):
         self.name = name
@@ -55,13 +56,13 @@ class WorldSubject(Subject):
         self._use(self._add(world))
 
     def _add(self, world: physics.World) -> str:
-        """Listen to another world of the scene, and return the name of its accuracy."""
+        """Add another world of the same scene, with a listener; returns the name of its accuracy."""
         name = accuracy_name(world.accuracy)
         self._worlds[name] = world, Listener(world)
         return name
 
     def _use(self, accuracy: str) -> None:
-        """Go on in the world at an accuracy that was added."""
+        """Continue in the added world that has the accuracy of this name."""
         self.accuracy = accuracy
         self.world, self.listener = self._worlds[accuracy]
 
@@ -111,24 +112,26 @@ class WorldSubject(Subject):
         self.listener.resume(snapshot.pushes)
 
     def _take(self) -> Any:
-        """State of the world, and of what is around it."""
+        """State of the world, and of the environment around it."""
         return self.world.snapshot()
 
     def _put(self, state: Any, is_other: bool = False) -> None:
-        """Go on from a state of `_take`; `is_other`: of another accuracy."""
+        """Continue from a result of `_take`; `is_other`: it was taken at another accuracy."""
         self.world.restore(fitted(state, self.world) if is_other else state)
 
 
 class LiveSubject(WorldSubject):
-    """A subject in which the user acts.
+    """Subject in which the user can act.
 
     Parameters
     ----------
     world : World
-        Its own, of one world; its scene declares what sliders change (`copies.copied`).
+        Batch of one world, which only this subject uses. Its scene declares the effects that sliders change
+        (`copies.copied`).
     name : str
+        Short name for titles.
     seed : bool
-        Another seed makes another run.
+        Whether different seeds lead to different runs.
     """
 
     def __init__(self, world: physics.World, name: str, seed: bool = False):
@@ -148,7 +151,7 @@ class LiveSubject(WorldSubject):
         return {name: value for name, value in values.items() if getattr(self.can, name)}
 
     def set(self, name: str, value: float) -> None:
-        """Change one of `SLIDERS`: the strength of gravity [m/s²], or a coefficient of all bodies."""
+        """Change a parameter of `SLIDERS`: the strength of gravity [m/s²], or a coefficient of all bodies."""
         self._hold(name, value)
         self.listener.is_changed = False  # the state is the same
 
@@ -157,11 +160,11 @@ class LiveSubject(WorldSubject):
         self.world.set_parameters(**{name: value * self._down if name == "gravity" else value})
 
     def prepare(self, name: str) -> Callable[[], None]:
-        """Make another preset ready for `switch`; returns the rest of the work, which another thread may do."""
+        """Make a world for another preset, for `switch`; returns a function that compiles it in any thread."""
         raise NotImplementedError
 
     def switch(self, name: str) -> None:
-        """Go on at another preset, from the same state."""
+        """Continue with another preset, from the same state."""
         pushes, state = self.listener.pushes, self._take()
         self._use(name)
         self._put(state, is_other=True)
@@ -169,7 +172,7 @@ class LiveSubject(WorldSubject):
 
 
 class LiveWorld(LiveSubject):
-    """World of one scene, and nothing around it."""
+    """Subject of a world without an environment."""
 
     def __init__(self, world: physics.World, name: str):
         super().__init__(world, name)
@@ -183,7 +186,7 @@ class LiveWorld(LiveSubject):
         self.listener.begin()
         if self.world.actuation is None:
             self.world.step(load)
-        else:  # the user's hand is no command
+        else:  # the user's force does not go through the actuator
             with self.world.actuation.passed_by(None if load is None else load[None]):
                 self.world.step()
 
@@ -197,5 +200,5 @@ class LiveWorld(LiveSubject):
         return lambda: warm(world)
 
     def _at(self, accuracy: Any) -> physics.World:
-        """Another world of the scene."""
+        """Make another world of the scene, with another accuracy."""
         return physics.World(self.world.scene, dt=self.world.dt, accuracy=accuracy)

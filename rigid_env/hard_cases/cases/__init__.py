@@ -1,1 +1,1 @@
-"""The hard cases, one file per subject."""
+"""Hard cases, one file per subject."""

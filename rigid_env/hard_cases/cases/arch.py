@@ -1,4 +1,4 @@
-"""The semicircular arch of wedge stones, and the thickness at which it stands, by limit analysis."""
+"""Hard case of a semicircular arch of wedge stones: the thickness at which it stands, by limit analysis."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ import physics
 from rigid_env.hard_cases.case import Case, Check, Setting, at_least, none_of
 from rigid_env.hard_cases.cases import stacks
 
-FRICTION = 0.8  # stones slide on each other only below about 0.4: what gives are hinges
-WIDTH, DENSITY = 0.25, 1000.0  # of the arch along z [m], of the stone [kg/m³]
+FRICTION = 0.8  # stones would slide on each other only below about 0.4, so the arch fails by hinges
+WIDTH, DENSITY = 0.25, 1000.0  # width of the arch along z [m], density of the stones [kg/m³]
 
-# To which a linear program is solved, and by which an arch's weight may lack support.
+# Accuracy of the linear program, and share of an arch's weight that may lack support.
 SOLVED = 1e-7
 
-# Share by which the arch is thicker or thinner than the limit.
+# Share by which the tested arches are thicker or thinner than the limit.
 NEAR = 0.005
 
-# An arch has fallen when a stone has moved by so much, a thickness [m].
+# Displacement of a stone from which on an arch has fallen, about a thickness [m].
 FALLEN = 0.1
 
 
 def joints(stones: int, thickness: float) -> np.ndarray:
-    """(stones + 1, 2, 2) inner and outer end of each joint of an arch of mean radius 1 m over y = 0 [m]."""
+    """Inner and outer end of each joint (stones + 1, 2, 2) of an arch of mean radius 1 m above y = 0 [m]."""
     angles = np.linspace(0.0, np.pi, stones + 1)
     rays = np.column_stack([np.cos(angles), np.sin(angles)])
     rays[[0, -1], 1] = 0.0
@@ -33,7 +33,7 @@ def joints(stones: int, thickness: float) -> np.ndarray:
 
 
 def arch(stones: int, thickness: float) -> physics.Scene:
-    """Wedge stones between neighbouring joints, on a floor y = 0."""
+    """Scene with an arch of wedge stones, one between each pair of neighbouring joints, on a floor y = 0."""
     ends, bodies = joints(stones, thickness), []
     for here, there in pairwise(ends):
         outline = [*here, *there[::-1]]
@@ -44,7 +44,7 @@ def arch(stones: int, thickness: float) -> physics.Scene:
 
 
 def least_thickness(stones: int) -> float:
-    """Least ratio of thickness to radius at which the arch stands: root of `missing_force`, to 1e-7."""
+    """Least ratio of thickness to radius for which the arch stands, to 1e-7: the zero of `missing_force`."""
     low, high = 0.05, 0.2
     while high - low > SOLVED:
         middle = 0.5 * (low + high)
@@ -53,12 +53,12 @@ def least_thickness(stones: int) -> float:
 
 
 def missing_force(stones: int, thickness: float) -> float:
-    """Least sum of helping forces that holds the arch, by its weight; 0 if it stands unaided.
+    """Least sum of helping forces that holds the arch, as a share of its weight; 0 if it stands without help.
 
-    The linear program of limit analysis: forces at both ends of every joint that push, with friction within Coulomb's
-    law, and the weight are in equilibrium on every stone, with the help of forces and moments of any sign, whose sizes
-    are summed. Nothing of the engine is in it: the outline of a stone is all, its area and centroid by the shoelace
-    formula.
+    It is the solution of the linear program of limit analysis. Contact forces at both ends of every joint push and obey
+    Coulomb's law. Together with the weight, and with helping forces and moments of any sign, they keep every stone in
+    equilibrium. The sum of the sizes of the helping forces and moments is minimised. The engine is not used: area and
+    centroid of a stone follow from its outline by the shoelace formula.
     """
     ends = joints(stones, thickness)
     A = np.zeros((3 * stones, 4 * (stones + 1)))
@@ -98,17 +98,19 @@ def _weight(outline: np.ndarray) -> tuple[float, float]:
 def arches(setting: Setting) -> list[Check]:
     """Arches of 7, 15 and 51 stones, 0.5 % thicker and 0.5 % thinner than the limit for their number of stones.
 
-    Masonry of stiff stones that do not slide stands if and only if forces within it can balance its weight [1]: whether
-    they can is a linear program (`missing_force`) [2]. A semicircular arch gives at hinges in five joints. With few
-    stones there may be no joint at the best place for a hinge: 7 stand from thickness/radius = 0.0957 on, 15 from
-    0.1061, 51 from 0.1074; for ever thinner stones it is 0.1075 [3].
+    Masonry of stiff stones that do not slide stands if and only if forces inside it can balance its weight [1]. A
+    linear program (`missing_force`) decides whether they can [2]. A semicircular arch fails by hinges at five joints.
+    With few stones there may be no joint at the best place for a hinge, so the limit of thickness/radius is lower:
+    0.0957 for 7 stones, 0.1061 for 15, 0.1074 for 51, and 0.1075 for thinner and thinner stones [3].
 
-    Standing, for a minute: each of n + 1 joints may open or close by one slop at one end, which turns all that is above
-    it, within 2 m, by that slop over the thickness. Falling: the least sum of helping forces, m times the weight, is by
-    duality the power of the weight in a mechanism no part of which is faster than 1 (m/s, rad/s). Its kinetic energy is
-    at most M (the stones' moments of inertia add 1 % to ½ M (1² + 1²)), so that its acceleration is at least m g/2.1
-    along it, more as it goes on: somewhere by ½ (m g/2.1) T² within the time T, here by a thickness; at the first whole
-    second after that the run ends, before the stones lie in a heap. A quick run has 7 and 15 stones.
+    Limit for a standing arch, after a minute: each of the n + 1 joints may open or close by one slop at one end. This
+    turns everything above the joint, within 2 m, by the slop over the thickness.
+
+    Limit for a falling arch: the least sum of helping forces is m times the weight. By duality it is the power of the
+    weight in a mechanism in which no part is faster than 1 (m/s, rad/s). The kinetic energy of this mechanism is at
+    most M: the stones' moments of inertia add 1 % to ½ M (1² + 1²). So its acceleration is at least m g/2.1, and it
+    grows. Within the time T some stone moves by ½ (m g/2.1) T², here a thickness. The run ends at the first whole
+    second after that, before the stones lie in a heap. A quick run has 7 and 15 stones.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Hard cases of sequences of impacts: bounces to rest, bounces for ever, a body in a closed box."""
+"""Hard cases of sequences of impacts: bounces that come to rest, bounces without end, a body in a closed box."""
 
 from __future__ import annotations
 
@@ -22,25 +22,31 @@ from rigid_env.hard_cases.cases.scenery import (
     state_of,
 )
 
-HEIGHT = 1.0  # from which bodies are dropped [m]
+HEIGHT = 1.0  # height from which bodies are dropped [m]
 
 
 def _dropped(e: float, height: float = HEIGHT) -> physics.Scene:
-    """The block falls face down, without friction."""
+    """Scene in which the block falls face down from `height` [m] onto a floor with restitution e, without friction."""
     return on_floor(block((0.0, SIZE[1] / 2 + height, 0.0)), e)
 
 
 def zeno(on: Setting) -> Sequence[Check]:
-    """Dropped from h with e < 1: at rest after √(2h/g)(1+e)/(1-e), having gone h (1+e²)/(1-e²) up and down.
+    """The block is dropped from h with e < 1: it rests after √(2h/g)(1+e)/(1-e), after a path of h (1+e²)/(1-e²).
 
-    A fall of √(2h/g), then flights of 2 e^k √(2h/g) to heights e^2k h: two geometric series (Stronge, *Impact
-    Mechanics*, section 1). The event-driven scheme states the time of rest: places are rounded to 4e-16 m, at the last
-    speeds, 1e-5 m/s, 4e-11 s, again a series. Else the body rests when it is seen no more above H = g dt²/8, the height
-    of a flight of dt, and the slop. A flight of t is seen at g (t² - dt²)/8 or higher, wherever in it the steps end:
-    those of t <= √(dt² + 8H/g), and what follows, t/(1-e), are not seen; the last sight is up to a step old.
-    The way of a step with an impact is taken as that from start to floor to end; an apex between floor and end of one
-    step is not seen, which is no higher than g dt²/2 = 4 H, nor all after it, up and down; and each of ln(h/H)/ln(1/e²)
-    bounces may happen a slop too high.
+    A fall of √(2h/g) is followed by flights of 2 e^k √(2h/g) to heights e^2k h: two geometric series (Stronge, *Impact
+    Mechanics*, section 1).
+
+    Limit of the event-driven scheme for the time of rest, which it reports as an event: positions are rounded to 4e-16
+    m, at the last speeds, 1e-5 m/s, 4e-11 s, which add up in a geometric series, too.
+
+    Limit of time stepping: the body counts as resting once it is no longer seen above H, the height g dt²/8 of a flight
+    of dt plus the slop. A flight of the duration t is seen at g (t² - dt²)/8 or higher, wherever the steps end in it.
+    So flights with t <= √(dt² + 8H/g), and the time t/(1-e) that follows, are not seen. The last sight is up to a step
+    old.
+
+    Limit for the path: a step with an impact counts as a path from its start to the floor and on to its end. An apex
+    between the floor and the end of the same step is not seen. It is at most g dt²/2 = 4 H high, like all later ones,
+    up and down. Each of ln(h/H)/ln(1/e²) bounces may happen a slop too high.
     """
     checks = []
     for e in (0.3, 0.5, 0.8):
@@ -65,7 +71,7 @@ def zeno(on: Setting) -> Sequence[Check]:
 
 
 def _fall(world, steps: int) -> np.ndarray:
-    """(3, steps + 1): heights above the floor [m], speeds [m/s], times [s]."""
+    """Motion (3, steps + 1) of a falling block: heights above the floor [m], velocities along y [m/s], times [s]."""
     rows = []
     for _ in range(steps + 1):
         rows.append((world.pos[0, 0, 1] - SIZE[1] / 2, world.linvel[0, 0, 1], world.time))
@@ -74,7 +80,10 @@ def _fall(world, steps: int) -> np.ndarray:
 
 
 def _way(y: float, v: float, new_y: float, new_v: float) -> float:
-    """Path length [m] up and down in a step between two heights and speeds: a parabola, or to the floor and up."""
+    """Path length of the block in a step, up and down [m], from the heights and velocities before and after it.
+
+    The path is a piece of a parabola, or goes down to the floor and up again if the step contains an impact.
+    """
     if new_v > max(v, 0.0):  # hit the floor, and rises
         return max(v, 0.0) ** 2 / GRAVITY + abs(y) + abs(new_y)
     if v > 0 > new_v:
@@ -83,10 +92,10 @@ def _way(y: float, v: float, new_y: float, new_v: float) -> float:
 
 
 def elastic(on: Setting) -> Sequence[Check]:
-    """e = 1: 10,000 bounces of the block, and the apex stays where it was.
+    """The block bounces 10,000 times with e = 1, and its apex stays at the same height.
 
-    E = m g (h + apex) is that of the start. An impact turns the velocity round in place; steps and impacts round the
-    energy a few times each, all of them the same way at worst.
+    The energy E = m g (h + apex) must stay that of the start. An impact reverses the velocity in place. Each step and
+    each impact rounds the energy a few times, in the worst case always in the same direction.
     """
     scene = _dropped(1.0)
     world = on.world(scene)
@@ -100,9 +109,9 @@ def elastic(on: Setting) -> Sequence[Check]:
 
 
 def _leaving(on: Setting, e: float, speed: float) -> float:
-    """Speed after the block's impact on the floor in the first of 20 steps without gravity, by the speed before.
+    """Ratio of the block's speed after its impact on the floor to `speed` before it.
 
-    An engine with soft contacts needs some of these steps.
+    The impact is in the first of 20 steps without gravity; an engine with soft contacts needs some of these steps.
     """
     scene = on_floor(block((0.0, SIZE[1] / 2 + 0.5 * speed * on.dt, 0.0), linvel=(0, -speed, 0)), e, gravity=(0, 0, 0))
     world = on.world(scene)
@@ -111,11 +120,11 @@ def _leaving(on: Setting, e: float, speed: float) -> float:
 
 
 def restitution(on: Setting) -> Sequence[Check]:
-    """The block hits the floor flat: -v⁺/v⁻ is the scene's e, 0 to 1, from 1 mm/s to 100 m/s.
+    """The block hits the floor flat: -v⁺/v⁻ equals the scene's e, from 0 to 1, at speeds from 1 mm/s to 100 m/s.
 
-    Without gravity the velocity after it is that of the impact; rounded a few times. Time stepping does not make a
-    rebound that would be over within `rest_share` of the step: the threshold is there to be set, and 0 lets a
-    bounce at 0.5 mm/s under gravity, of a flight of 2 e v/g = 50 µs, happen.
+    Without gravity the velocity after the impact stays, apart from a few roundings. Time stepping leaves out a rebound
+    that would end within the share `rest_share` of a step. The user can set this threshold. With 0 even a bounce at 0.5
+    mm/s under gravity is made, which is a flight of 2 e v/g = 50 µs.
     """
     shares = np.arange(11) / 10
     worst = max(abs(_leaving(on, e, speed) - e) for e in shares for speed in (1e-3, 1.0, 100.0))
@@ -134,17 +143,18 @@ def restitution(on: Setting) -> Sequence[Check]:
 
 
 def _unfolded(place, velocity, t, half):
-    """Place of a point that flies between walls at ±half [m] and is reflected: the straight line, folded."""
+    """Position at time t [s] of a point between reflecting walls at ±half [m]: its straight path, folded."""
     along = np.mod(place + velocity * t + half, 4 * half)
     return np.where(along < 2 * half, along, 4 * half - along) - half
 
 
 def billiard(on: Setting) -> Sequence[Check]:
-    """A sphere between six walls, e = 1, no gravity, no friction: the unfolded straight line, folded; 10,000 hits.
+    """A sphere flies between six walls, e = 1, no gravity or friction: after 10,000 hits it is on the folded line.
 
-    Reflected in the walls the path is straight (Tabachnikov, *Geometry and Billiards*, chapter 1). Speeds are turned
-    round without rounding; steps and hits round places of up to 5 m by half a unit in the last place, all the same
-    way at worst. A constant speed makes the time of a hit one division, without a slop (but see `early`).
+    Reflecting the space at each wall instead of the path makes the path straight (Tabachnikov, *Geometry and
+    Billiards*, chapter 1). Impacts reverse velocities without rounding. Each step and each hit rounds positions of up
+    to 5 m by half a unit in the last place, in the worst case always in the same direction. At a constant speed the
+    time of a hit is one division, without a slop; `early` has the exception.
     """
     radius, half, place, velocity = 0.5, 5.0, np.array([0.3, -1.1, 2.0]), np.array([3.0, 4.0, 5.0])
     hits = on.pick(10_000, 1000)
@@ -161,10 +171,10 @@ def billiard(on: Setting) -> Sequence[Check]:
 
 
 def tumbling(on: Setting) -> Sequence[Check]:
-    """The block tumbles between six walls, e = 1, μ = 0, no gravity: energy constant, and a replay has the same bits.
+    """The block tumbles between six walls, e = 1, μ = 0: the energy stays, and a second run has the same bits.
 
-    One contact at a time leaves with exactly the energy it came with, j = -2 v_n/W: some 300 operations per hit and per
-    step round it at random, a walk of which three deviations are allowed.
+    After an impact of one contact, j = -2 v_n/W, the energy is exactly that before. Some 300 operations per hit and per
+    step round it at random. The limit is three standard deviations of this random walk.
     """
     body = block((0, 0, 0), linvel=(3.0, 4.0, 5.0), angvel=(1.0, 2.0, 0.5))
     scene = boxed(body, (5.0, 5.0, 5.0), 1.0)

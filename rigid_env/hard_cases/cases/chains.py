@@ -1,4 +1,4 @@
-"""Impacts that depend on their order: Newton's cradle, and two masses that count digits of π."""
+"""Hard cases of impacts whose order matters: Newton's cradle, and two masses that count digits of π."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from physics.accuracy import resolve
 from rigid_env.hard_cases.case import Case, Check, Setting, within
 
 RADIUS = 0.5  # [m]
-SPEED = 3.0  # of the ball that strikes [m/s]
+SPEED = 3.0  # speed of the striking ball [m/s]
 
 
 def cradle(count: int, gap: float) -> physics.Scene:
-    """One ball at `SPEED` towards count - 1 balls at rest, `gap` [m] apart; 1 kg each, e = 1."""
+    """Scene with one ball at `SPEED` towards count - 1 balls at rest, `gap` [m] apart; each has 1 kg, and e = 1."""
     places = [-4 * RADIUS] + [k * (2 * RADIUS + gap) for k in range(1, count)]
     bodies = [
         physics.Sphere(RADIUS, 1.0, pos=(x, 0, 0), linvel=(SPEED if k == 0 else 0.0, 0, 0))
@@ -26,16 +26,18 @@ def cradle(count: int, gap: float) -> physics.Scene:
 
 
 def newtons_cradle(setting: Setting) -> list[Check]:
-    """One ball strikes n - 1 that touch, n = 3 and 5: at once, or in turn.
+    """One ball strikes n - 1 balls at rest, n = 3 and 5: all impacts at once, or one after the other.
 
-    At once: one problem for all contacts. By Newton's law each normal velocity is reversed, u_1 = v becomes -v and u_k
-    = 0 stays. With x the first ball's velocity after, all others have x + v, and momentum says n x + (n - 1) v = v: x =
-    -(n - 2)/n v, the others 2/n v: (-1/3, 2/3, 2/3) v of three. Energy: ((n - 2)² + 4 (n - 1))/n² = 1.
+    At once, one contact problem has all contacts. By Newton's law each normal velocity is reversed: u_1 = v becomes -v,
+    and u_k = 0 stays. Let x be the velocity of the first ball after the impact; then all others have x + v. Momentum
+    gives n x + (n - 1) v = v, so x = -(n - 2)/n v, and the others have 2/n v: (-1/3, 2/3, 2/3) v for three balls. The
+    energy is kept: ((n - 2)² + 4 (n - 1))/n² = 1.
 
-    In turn: two equal balls exchange their velocities, so that the last one alone leaves with v. Balls a hair apart (1
-    mm) do that by themselves; for balls that touch it is chosen by `Accuracy(collisions="sequential")`.
+    In turn, two equal balls exchange their velocities, so that only the last ball moves in the end, with v. Balls 1 mm
+    apart do this without a setting; for touching balls the setting `Accuracy(collisions="sequential")` chooses it.
 
-    The speeds are solved to the tolerance of the free contact speed v, at each of n - 1 impacts and contacts.
+    Limit: the velocities are solved to the tolerance of the free contact speed v, at each of n - 1 impacts and
+    contacts.
     """
     checks = []
     for count in (3, 5):
@@ -60,7 +62,7 @@ def _after(setting: Setting, scene: physics.Scene) -> np.ndarray:
 
 
 def _in_turn(setting: Setting, count: int) -> Check:
-    """True if balls that touch pass the impact on one by one with the option `sequential`."""
+    """Check that touching balls pass the impact on one after the other with the setting `sequential`."""
     chosen = replace(setting, accuracy=replace(resolve(setting.accuracy), collisions="sequential"))
     after = _after(chosen, cradle(count, 0.0))
     error = float(np.abs(after - SPEED * (np.arange(count) == count - 1)).max())
@@ -68,13 +70,14 @@ def _in_turn(setting: Setting, count: int) -> Check:
 
 
 def digits_of_pi(setting: Setting) -> list[Check]:
-    """A heavy ball drives a light one against a wall, e = 1: floor(π √ratio) collisions, those with the wall included.
+    """A heavy ball drives a light one against a wall, e = 1: floor(π √ratio) collisions, with the wall or each other.
 
-    In the plane (√m1 x1, √m2 x2) the motion is a billiard ball in a wedge of angle atan(√(m1/m2)); unfolded, a straight
-    line that crosses the wedge's images π/angle times. Between two collisions the light ball crosses the free gap x
-    between wall and heavy ball at the speed v1, or from one to the other at least as much as is left of it, so that
-    half of x/(|v1| + 3 |v2|) is a step with at most one collision (|v1| grows by 2 |v2| in one). An impact of one
-    contact is answered in closed form: the energy is off by rounding per collision, and two gaps within the slop.
+    In the plane (√m1 x1, √m2 x2) the motion is that of a billiard ball in a wedge of the angle atan(√(m1/m2)).
+    Unfolded, it is a straight line that crosses the wedge's images π/angle times. The step is so short that it has at
+    most one collision: half of x/(|v1| + 3 |v2|), where x is the free gap between wall and heavy ball. (Between two
+    collisions the light ball crosses at least what is left of this gap, and a collision increases |v1| by at most 2
+    |v2|.) Limit: an impact of one contact is solved in closed form, so the energy is off only by rounding in each
+    collision.
 
     References
     ----------
@@ -98,7 +101,7 @@ def digits_of_pi(setting: Setting) -> list[Check]:
 
 
 def _collisions(setting: Setting, world) -> int:
-    """Count changes of any velocity until both balls move off, the heavy one no slower."""
+    """Count collisions, the steps that change a velocity, until both balls move away, the heavy one not slower."""
     seen = 0
     for _ in range(100_000):
         (light, heavy), place = world.linvel[0, :, 0].tolist(), float(world.pos[0, 1, 0])

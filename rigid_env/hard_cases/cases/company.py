@@ -1,7 +1,7 @@
-"""Hard cases of bodies in company: collision, clearance, seam and far body must leave other motions unchanged.
+"""Hard cases of several bodies: a collision, a gap, a seam or a far body must not change other motions.
 
-Each draws placements of one scene and runs them as worlds side by side. Public reports against other engines are of
-these kinds; those of this engine are in the decisions.
+Each case draws placements of one scene and runs them as worlds side by side. Public reports against other engines
+describe such faults; the decisions describe those of this engine.
 """
 
 from __future__ import annotations
@@ -18,38 +18,43 @@ from physics.scene.canonical_scenes import GRAVITY
 from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases.scenery import EPS, FLOOR, laws
 
-RADIUS = 0.03  # of the balls [m]
+RADIUS = 0.03  # radius of the balls [m]
 SLAB = 0.5  # thickness of slabs [m]
-LENGTH = 0.8  # of each of five of them [m]
+LENGTH = 0.8  # length of each of five slabs in a row [m]
 
 
 def _side_by_side(on: Setting, scene: physics.Scene, pos, linvel, **more) -> physics.World:
-    """Worlds of the scene, one for each row of the positions (worlds, bodies, 3)."""
+    """Make worlds of a scene, one for each row of `pos` and `linvel` (worlds, bodies, 3).
+
+    `more` are further arguments of `World.set_state`.
+    """
     world = on.world(scene, len(pos))
     world.set_state(pos=pos, linvel=np.broadcast_to(linvel, pos.shape), **more)
     return world
 
 
 def _rows(*parts) -> np.ndarray:
-    """(worlds, bodies, 3) of one (worlds, 3) or (3,) for each body."""
+    """Stack arrays (worlds, 3) or (3,), one for each body, to an array (worlds, bodies, 3)."""
     count = max(len(np.atleast_2d(part)) for part in parts)
     return np.stack([np.broadcast_to(part, (count, 3)) for part in parts], axis=1).astype(float)
 
 
 def _along_x(x, y: float = 0.0) -> np.ndarray:
-    """(worlds, 3) points at the height y."""
+    """Points (worlds, 3) with these x, at the height y and z = 0."""
     return np.stack([np.asarray(x), np.full(np.shape(x), y), np.zeros(np.shape(x))], axis=1)
 
 
 def bounce_in_company(on: Setting) -> Sequence[Check]:
-    """A ball on a table hits an equal one, a ball falls on a block that lies: speeds apart are e times those before.
+    """A ball hits an equal ball on a table, a ball falls on a block: relative speeds are e times those before.
 
-    Head on, without friction, the floor takes no part: u⁺ = -e u⁻ of the two balls, v₂ = (1 + e)/2 v. A ball of mass m
-    on a lying block: the floor holds the block within the moment of impact, Newton's law for both contacts at once,
-    so that the ball leaves with e √(2 g h), and the block rests. Each from many distances: a step may begin at any
-    place before the impact. Where a step begins inside a slop of the impact, the ball has got a slop's speed less;
-    contact problems leave their tolerance of the speed, once at the impact and once for each step at rest before it.
-    A cube that falls flat on the block hits it with four corners at once, at the first impact and at those that follow.
+    Two balls head on, without friction: the floor has no part in it, u⁺ = -e u⁻ for the two balls, and v₂ = (1 + e)/2
+    v. A ball falls on a block on the floor: the floor holds the block at the moment of impact, and Newton's law holds
+    at both contacts at once. So the ball leaves with e √(2 g h), and the block rests.
+
+    Each runs from many distances, since a step may begin at any place before the impact. Limits: if a step begins
+    within a slop of the impact, the ball lacks the speed of a slop's fall. Each contact problem leaves its tolerance of
+    the speed, once at the impact and once for each step at rest before it. The last check is a cube that falls flat on
+    the block and hits it with four corners at once, several times.
     """
     count, checks = on.pick(400, 60), []
     for e in (0.0, 0.3, 0.8, 1.0):
@@ -71,7 +76,10 @@ def bounce_in_company(on: Setting) -> Sequence[Check]:
 
 
 def _flat(on: Setting) -> Check:
-    """Spin of a cube that falls flat on a block that lies, until after its third impact: what solves leave of v/a."""
+    """Check the spin of a cube that falls flat on a block on the floor, until after its third impact.
+
+    The limit is what solves to the tolerance leave of v/a, speed over half the edge.
+    """
     side, h, e = 0.5, 0.5, 0.8
     bodies = [
         physics.Block((2, 0.2, 2), 50.0, pos=(0, 0.1, 0)),
@@ -85,7 +93,10 @@ def _flat(on: Setting) -> Check:
 
 
 def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
-    """Largest difference between the ball's energy above the block after its first bounce and e² m g h, by m g h."""
+    """Largest error of the energy of bouncing balls after the first bounce, by m g h.
+
+    The energy above the block should be e² m g h; `h` (worlds,) are the heights of fall [m].
+    """
     fall = np.sqrt(2 * h / GRAVITY)
     worst = np.zeros(len(h))
     for _ in range(on.steps(float((fall * (1 + e)).min()))):
@@ -98,7 +109,7 @@ def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
 
 
 def _attitudes(rng, count: int) -> np.ndarray:
-    """(count, 2, 4) unit quaternions, any attitude as likely as any other."""
+    """Random attitudes (count, 2, 4), unit quaternions uniform over all attitudes."""
     quat = rng.normal(size=(count, 2, 4))
     return quat / np.linalg.norm(quat, axis=2, keepdims=True)
 
@@ -106,10 +117,11 @@ def _attitudes(rng, count: int) -> np.ndarray:
 def passing(on: Setting) -> Sequence[Check]:
     """Bodies that pass each other without touching move as if they were alone.
 
-    Blocks and balls fly past each other at clearances from 1e-5 to 0.1 m: no force acts, so velocities keep their
-    bits but for the sums that make them up, and there is no impact. The clearance is that of bounding spheres where
-    bodies turn. Where they do not it is that of their shadows along the way, the largest n·d - s(n) over all n across
-    the way, d from the block to the ball and s the reach of both.
+    Blocks and balls fly past each other at clearances from 1e-5 to 0.1 m. No force acts, so velocities keep their bits,
+    apart from the rounding of the sums that form them, and there is no impact. For bodies that turn, the clearance is
+    that of their bounding spheres. For others it is the clearance of their projections along the flight direction: the
+    largest n·d - s(n) over all n perpendicular to it, with d from the block to the ball and s the support functions of
+    both.
     """
     rng, count = np.random.default_rng(5), on.pick(400, 60)
     bodies = [physics.Block((1, 0.6, 0.4), 1.0, pos=(0, 0, 0)), physics.Sphere(0.4, 0.7, pos=(5, 0, 0))]
@@ -140,7 +152,11 @@ def passing(on: Setting) -> Sequence[Check]:
 
 
 def _offset(across, other, R, clearance: float) -> float:
-    """Distance along `across` at which a ball passes the turned block at this clearance, both seen along the way."""
+    """Offset of a ball's path along `across` [m] for which the ball passes the turned block at a clearance [m].
+
+    Seen along the path, `across` and `other` are the axes of the picture, and the clearance is the gap in it. R is the
+    rotation matrix of the block.
+    """
     angle = np.linspace(0, 2 * math.pi, 3601)
     n = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * other
     reach = np.abs(n @ R) @ (0.5, 0.3, 0.2) + 0.4
@@ -152,10 +168,10 @@ def _offset(across, other, R, clearance: float) -> float:
 
 
 def sliding_past(on: Setting) -> Sequence[Check]:
-    """A block slides past a heavy one at a clearance, and is slowed by the floor alone: v = v₀ - μ g t.
+    """A block slides past a heavy one at a clearance, and only the floor slows it down: v = v₀ - μ g t.
 
-    The other block lies beside its way, its edge nearest of all that it has in front. The solver's residual turns the
-    block, so that its corner may reach the other: the clearances are above tolerance times way.
+    The heavy block lies beside the path of the sliding one. The solver's residual turns the sliding block, so that its
+    corner might reach the other. So the clearances are larger than the tolerance times the path.
     """
     count, checks = on.pick(24, 6), []
     for speed in (1.0, 5.0):
@@ -179,12 +195,13 @@ def sliding_past(on: Setting) -> Sequence[Check]:
 
 
 def seams(on: Setting) -> Sequence[Check]:
-    """A block slides and a ball rolls over five level slabs as over one, and over slabs that are a little lower.
+    """A block slides, and a ball rolls, over five slabs in a row as over a single one.
 
-    Flush slabs are one plane: what is off is a seam's, also for bodies that start 15 µm above it, and land softly, some
-    slops deep. A ball that rolls over the corner of four of them keeps its velocity.
-    Where each slab is 5e-6 m lower than the one before, four seams give g times their height to ½ v²:
-    1.3e-4 m/s at 1.5 m/s, less than 4e-5 m.
+    The slabs are flush, or each is slightly lower than the one before. Flush slabs are one plane, so any difference
+    comes from a seam. Bodies also start 15 µm above it and land softly,
+    some slops deep. A ball that rolls over the common corner of four slabs keeps its velocity. Where each slab is 5e-6
+    m lower than the one before, the four seams add g times their height to ½ v²: 1.3e-4 m/s at 1.5 m/s, which is less
+    than 4e-5 m.
     """
     count, checks = on.pick(60, 10), []
     rng = np.random.default_rng(3)
@@ -205,10 +222,11 @@ def seams(on: Setting) -> Sequence[Check]:
 
 
 def _over_corner(on: Setting) -> Check:
-    """A ball rolls along the diagonal of four slabs and over their common corner, or by a tenth of a millimetre off.
+    """Check that a ball keeps its velocity as it rolls diagonally over the common corner of four slabs.
 
-    At 1 ms at most: in a short step it meets edges ahead of it by some slops only, as if it landed on them. Where it is
-    on an edge within the slop, its push leans by √(2 slop/r): g times this over the time there, 2e-6 of 1 m/s.
+    The step is at most 1 ms: then the ball meets edges ahead of it only within some slops, as if it landed on them.
+    While the ball is on an edge within the slop, the contact normal leans by √(2 slop/r). Gravity times this angle
+    times the duration changes the velocity by 2e-6 of 1 m/s.
     """
     on = replace(on, dt=min(on.dt, 1e-3))
     slabs = [physics.Block((1, SLAB, 1), 1e4, pos=(x, 0.5 * SLAB, z)) for x in (-0.5, 0.5) for z in (-0.5, 0.5)]
@@ -224,12 +242,16 @@ def _over_corner(on: Setting) -> Check:
 
 
 def _slab(k: int, length: float, thickness: float) -> physics.Block:
-    """Slab k of a row along x from -1 m, on a floor at -`SLAB`."""
+    """Slab k of a row along x that starts at -1 m, on a floor at y = -`SLAB`."""
     return physics.Block((length, thickness, 4.0), 1e4, pos=(length * (k + 0.5) - 1, 0.5 * thickness - SLAB, 0))
 
 
 def _cross(on: Setting, body: physics.Body, mu: float, slabs, start, speed, turn) -> np.ndarray:
-    """Places of the bodies along x after 0.6 s, from the points `start` on at `speed` and turning about z [m]."""
+    """Positions x (worlds,) of a body after 0.6 s [m], in worlds with different starts and speeds of the body.
+
+    The speed (worlds,) is along x [m/s], `turn` is the angular velocity about z [rad/s], and `mu` the friction
+    coefficient.
+    """
     pos = _rows(start, *(slab.pos for slab in slabs))
     linvel, angvel = _rows(_along_x(speed), *np.zeros((len(slabs), 3))), np.zeros_like(pos)
     angvel[:, 0, 2] = turn
@@ -240,13 +262,13 @@ def _cross(on: Setting, body: physics.Body, mu: float, slabs, start, speed, turn
 
 
 def closed_pairs(on: Setting) -> Sequence[Check]:
-    """Pairs that hit each other in space keep linear and angular momentum to rounding, whatever their restitution.
+    """Pairs of bodies that collide in free space keep linear and angular momentum to rounding, at any restitution.
 
-    Impulses of a contact are opposite and act at one point. Each step rounds places, attitudes and momenta a few times,
-    all of them the same way at worst.
+    Impulses of a contact are opposite and act at one point. Each step rounds positions, attitudes and momenta a few
+    times, in the worst case always in the same direction.
     """
     rng, count, checks = np.random.default_rng(9), on.pick(200, 40), []
-    parts = 10 if on.is_event_driven else 1  # of a step that meets an error, each with its own roundings
+    parts = 10 if on.is_event_driven else 1  # parts of a step with error control, each with its own roundings
     sizes = {(1, 0.6, 0.4): 1.0, (0.5, 0.7, 0.6): 0.6}
     bodies = [physics.Block(size, mass, pos=(5 * k, 0, 0)) for k, (size, mass) in enumerate(sizes.items())]
     inertia = [body.mass / 12 * (np.sum(np.square(body.size)) - np.square(body.size)) for body in bodies]
@@ -267,7 +289,7 @@ def closed_pairs(on: Setting) -> Sequence[Check]:
 
 
 def _momenta(world: physics.World, bodies, inertia) -> tuple[np.ndarray, np.ndarray]:
-    """Linear and angular momenta of each world."""
+    """Linear and angular momentum (worlds, 3) of each world, from moments of inertia for each body."""
     p = np.array([body.mass for body in bodies])[:, None] * world.linvel
     L = np.cross(world.pos, p)
     for k, moments in enumerate(inertia):
@@ -277,10 +299,10 @@ def _momenta(world: physics.World, bodies, inertia) -> tuple[np.ndarray, np.ndar
 
 
 def far_body(on: Setting) -> Sequence[Check]:
-    """The place of a body that nothing comes near to does not change a bit of what the others do.
+    """The position of a body that nothing comes near changes no bit of the other bodies' motion.
 
-    Three blocks topple under a ball while another ball lies at one of five places, or flies at one of three speeds: the
-    same bits for each of the five, and for each of the three.
+    Three blocks topple under a ball. Another ball lies at one of five places, or flies at one of three speeds. The
+    motion of the others has the same bits for all five places, and the same bits for all three speeds.
     """
     bodies = [
         *(physics.Block((0.4, 0.4, 0.4), 1.0, pos=(0.05 * (k % 2), 0.2 + 0.4 * k, 0)) for k in range(3)),

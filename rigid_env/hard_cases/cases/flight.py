@@ -14,26 +14,29 @@ from rigid_env.hard_cases.case import Case, Check, Setting, within
 from rigid_env.hard_cases.cases.scenery import EPS, attitude, energy, free, is_finite, none_of_finite
 
 TURN_AT_ONCE = 0.06  # largest turn that the free-rotation flow makes at once [rad]
-ROUNDING = math.sqrt(300) * EPS  # of the attitude in it [rad]: some 300 operations, which round at random
+ROUNDING = math.sqrt(300) * EPS  # rounding of the attitude in it [rad]: some 300 operations, which round at random
 
-MOMENTS = (1.0, 2.0, 3.0)  # of the body that turns about its intermediate axis [kg m²]
+MOMENTS = (1.0, 2.0, 3.0)  # moments of inertia of the body that turns about its intermediate axis [kg m²]
 
 
 def angular_momentum(world, body: physics.Body) -> np.ndarray:
-    """About the centre of mass, world frame [kg m²/s]; from attitude and angular velocity."""
+    """Angular momentum (3,) of a body about its centre of mass, world frame [kg m²/s], from its state."""
     R = attitude(world)
     return R @ body.inertia @ R.T @ np.asarray(world.angvel)[0, 0]
 
 
 def thin_plate(on: Setting) -> Sequence[Check]:
-    """A plate 1 x 0.01 x 1 m of 1 kg spins askew at 1e3, 1e4 and 1e5 rad/s.
+    """A plate 1 x 0.01 x 1 m of 1 kg spins about an oblique axis at 1e3, 1e4 and 1e5 rad/s.
 
-    Its two equal moments I_t make it a symmetric top: L stays, the axis d precesses about L at Ω = |L|/I_t, and the
-    body turns about d at n = ω_d (1 - I_d/I_t) besides (Landau and Lifshitz, *Mechanics*, section 33):
-    q(t) = turn(L, Ω t) q(0) turn(d, n t). Every turn of 0.06 rad rounds the attitude; the angle between d and L, and
-    with it the energy, then walks at random, √N of these roundings in N turns (ten deviations are allowed, since
-    equal turns round alike). Both rates depend on that angle, so that the error of the attitude is that walk times the
-    angle A turned in all, N = A/0.06. L is kept as it is, and only read off attitude and spin here.
+    Its two equal moments I_t make it a symmetric top. L is constant. The plate's axis d precesses about L at Ω =
+    |L|/I_t, and the plate turns about d at n = ω_d (1 - I_d/I_t) (Landau and Lifshitz, *Mechanics*, section 33). So the
+    attitude is q(t) = turn(L, Ω t) q(0) turn(d, n t).
+
+    Limits: every rotation by 0.06 rad rounds the attitude. So the angle between d and L, and with it the energy, takes
+    a random walk of √N roundings in N of these rotations. The limit is ten times this walk, since the roundings of
+    equal rotations are not independent. The rates Ω and n depend on the angle between d and L. So the error of the
+    attitude is the walk times the whole angle A that the plate has turned, with N = A/0.06. The engine stores L
+    unchanged; here it is computed from attitude and angular velocity, which rounds it.
     """
     checks = []
     for spin in (1e3, 1e4, 1e5):
@@ -63,14 +66,15 @@ def thin_plate(on: Setting) -> Sequence[Check]:
 
 
 def _body_rates(world) -> np.ndarray:
-    """Angular velocity in the body frame [rad/s]."""
+    """Angular velocity (3,) of the first body in the body frame [rad/s]."""
     return attitude(world).T @ np.asarray(world.angvel)[0, 0]
 
 
 def _crossing(world, dt: float, longest: float) -> float:
-    """Time [s] of the next zero of the body's ω₂, NaN without one; by the cubic with the slopes of Euler's equations.
+    """Time [s] at which the body's ω₂ next falls through zero; NaN if it does not within `longest` [s].
 
-    I₂ ω̇₂ = (I₃ - I₁) ω₃ ω₁.
+    Between two steps ω₂ is interpolated by a cubic whose slopes are those of Euler's equations, I₂ ω̇₂ = (I₃ - I₁) ω₃
+    ω₁.
     """
 
     def look():
@@ -93,13 +97,14 @@ def _crossing(world, dt: float, longest: float) -> float:
 
 
 def intermediate_axis(on: Setting) -> Sequence[Check]:
-    """I = (1, 2, 3), ω = (0.01, 1, 0.02): flips over twice in T = 4 K(k)/ω_p = 33.195 s.
+    """A body with I = (1, 2, 3) and ω = (0.01, 1, 0.02) flips over twice in the period T = 4 K(k)/ω_p = 33.195 s.
 
     Landau and Lifshitz, *Mechanics*, section 37, for L² > 2 E I₂: ω_p² = (I₃ - I₂)(L² - 2 E I₁)/(I₁ I₂ I₃) and
-    k² = (I₂ - I₁)(2 E I₃ - L²)/((I₃ - I₂)(L² - 2 E I₁)); k'² = 1 - k² = 1e-3 is what a difference leaves. With
-    K = ln(4/k') a change δ of the energy, which moves k'² by 4 δ, moves T by the share 4 δ/(2 k'² ln(4/k')); N steps
-    change the energy by 2 ε N at most, a mean of ε N over the run. The cubic that finds the two ends is off by
-    dt⁴ ω⁗/384 over the rate, below dt⁴/100.
+    k² = (I₂ - I₁)(2 E I₃ - L²)/((I₃ - I₂)(L² - 2 E I₁)); here k'² = 1 - k² is 1e-3.
+
+    Limit: with K = ln(4/k'), a relative change δ of the energy changes k'² by 4 δ, and T by the share 4 δ/(2 k'²
+    ln(4/k')). N steps change the energy by at most 2 ε N, on average by ε N over the run. The cubic that finds both
+    ends of the run has the error dt⁴ ω⁗/384 over the rate, which is below dt⁴/100.
     """
     first = np.array([0.01, 1.0, 0.02])
     I = np.array(MOMENTS)
@@ -122,9 +127,10 @@ def intermediate_axis(on: Setting) -> Sequence[Check]:
 def growth_rate(on: Setting) -> Sequence[Check]:
     """About the intermediate axis a small disturbance grows as exp(σ t), σ = ω √((I₂-I₁)(I₃-I₂)/(I₁ I₃)).
 
-    Euler's equations made linear, I₁ ω̇₁ = (I₂-I₃) ω ω₃ and I₃ ω̇₃ = (I₁-I₂) ω ω₁ (Goldstein, *Classical Mechanics*,
-    section 5.6): σ ω₁ = (I₂-I₃)/I₁ ω ω₃ along the mode that grows. It grows from 1e-6 to 1e-3; what is left out is of
-    second order, 1e-6 of the rate at the end, and rounding at the start is 1e-10 of the disturbance.
+    The linear form of Euler's equations is I₁ ω̇₁ = (I₂-I₃) ω ω₃ and I₃ ω̇₃ = (I₁-I₂) ω ω₁ (Goldstein, *Classical
+    Mechanics*, section 5.6). Its growing mode has σ ω₁ = (I₂-I₃)/I₁ ω ω₃. The disturbance grows from 1e-6 to 1e-3.
+    Limit: the terms left out are of second order, 1e-6 of the rate at the end; rounding at the start is 1e-10 of the
+    disturbance.
     """
     I = MOMENTS
     sigma = math.sqrt((I[1] - I[0]) * (I[2] - I[1]) / (I[0] * I[2]))
@@ -137,9 +143,10 @@ def growth_rate(on: Setting) -> Sequence[Check]:
 
 
 def parabola(on: Setting) -> Sequence[Check]:
-    """x = x₀ + v t + g t²/2, exact at any step (Galilei, *Two New Sciences*, 1638, fourth day).
+    """The block flies on the parabola x = x₀ + v t + g t²/2, exactly at any step (Galilei, *Two New Sciences*, 1638).
 
-    A uniform field turns nothing, and the block tumbles meanwhile. Each step rounds numbers of this size a few times.
+    A uniform field exerts no torque, and the block tumbles meanwhile. Each step rounds numbers of this size a few
+    times.
     """
     x, v, g = np.array([1, 2, 3.0]), np.array([4, 5, -6.0]), np.array([0.5, -9.81, 2])
     body = physics.Block((5, 3, 2), 6.0, pos=x, linvel=v, angvel=(0.1, 5.0, 0.1))

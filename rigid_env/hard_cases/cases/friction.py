@@ -27,15 +27,15 @@ from rigid_env.hard_cases.cases.scenery import (
     wrench,
 )
 
-RADIUS = 0.5 * float(np.linalg.norm(SIZE))  # of the block's bounding sphere [m]
+RADIUS = 0.5 * float(np.linalg.norm(SIZE))  # radius of the block's bounding sphere [m]
 HOUR, MINUTE = 3600.0, 60.0  # [s]
 
 
 def stop(on: Setting) -> Sequence[Check]:
-    """The block slides and stops after v²/(2 μ g), straight, in any heading, and then not one bit moves.
+    """The block slides straight in any direction, stops after v²/(2 μ g), and then no bit of its state changes.
 
-    Constant deceleration: exact but for the step in which it stops, and the tolerance of each contact problem, which is
-    relative to the free speed g dt of a step: a force off by that share of the weight.
+    The deceleration is constant, so the motion is exact apart from the step in which the block stops. A contact problem
+    is solved to the tolerance, relative to the free speed g dt of a step: its force is off by this share of the weight.
     """
     v, mu = 3.0, 0.3
     distance, wrong, bent, creep = v * v / (2 * mu * GRAVITY), 0.0, 0.0, 0
@@ -58,23 +58,24 @@ def stop(on: Setting) -> Sequence[Check]:
 
 
 def _incline(angle: float, mu: float) -> physics.Scene:
-    """The block face down on an incline falling along +x: gravity is turned, the floor is not."""
+    """Scene with the block face down on an incline that descends along +x: gravity is rotated instead of the floor."""
     pull = (GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle), 0.0)
     return on_floor(block(), friction=mu, gravity=pull)
 
 
 def _tilted(angle: float, mu: float) -> physics.Scene:
-    """The incline as a turned wall, gravity unchanged."""
+    """Scene with the block face down on an incline that descends along +x: the floor is rotated, not gravity."""
     normal = (math.sin(angle), math.cos(angle), 0.0)
     body = block(tuple(0.5 * SIZE[1] * n for n in normal), quat=turned(-angle))
     return physics.Scene([body], [physics.HalfSpace(normal)], laws(0.0, mu))
 
 
 def incline(on: Setting) -> Sequence[Check]:
-    """Sticks iff tanθ ≤ μ, μ 0.1 % above and below it; no creep in an hour; else a = g (sinθ - μ cosθ).
+    """The block on an incline sticks iff tanθ ≤ μ, without creep in an hour; else it slides with a = g (sinθ - μ cosθ).
 
-    Coulomb. Settling within the slop comes first (one second); then not one bit of an hour. A contact force is good to
-    the tolerance, relative to the weight: a is off by that share of g, and twice for what turns with it.
+    This is Coulomb's law, tested with μ 0.1 % above and below tanθ. The block first settles within the slop for one
+    second; then no bit may change for an hour. Limit: a contact force is accurate to the tolerance, relative to the
+    weight. So a is off by this share of g, and once more by the part that comes from rotation.
     """
     checks, long = [], on.pick(HOUR, MINUTE)
     moved, wrong, limit = 0.0, 0.0, 0.0
@@ -101,9 +102,9 @@ def incline(on: Setting) -> Sequence[Check]:
 
 
 def at_rest(on: Setting) -> Sequence[Check]:
-    """The block on the floor for 1,000,000 steps: no creep, no sinking, no kinetic energy; not one bit.
+    """The block lies on the floor for 1,000,000 steps: no creep, no sinking, no kinetic energy; no bit changes.
 
-    Forces balance the weight: its sum is that of the four corners.
+    The sum of the forces at the four corners equals the weight.
     """
     world = on.world(on_floor(block(), friction=0.5))
     world.step(steps=10)
@@ -123,11 +124,12 @@ def at_rest(on: Setting) -> Sequence[Check]:
 
 
 def squeezed(on: Setting) -> Sequence[Check]:
-    """A block between two jaws that are pressed together by F: held iff 2 μ F ≥ m g, tried 1 % above and below.
+    """A block is held between two jaws that are pressed together by F iff 2 μ F ≥ m g, tested 1 % above and below.
 
-    Each jaw's normal force is F, its friction at most μ F. What carries the jaws is their weight and half the block's,
-    so that all three stand still while it is held; below the limit it falls at g - 2 μ F/m. A contact is solved to the
-    tolerance, relative to the free speed g dt of a step: a force off by that share of the weight of a jaw.
+    The normal force of each jaw is F, and its friction is at most μ F. External forces carry the weight of the jaws and
+    of the block, so that all three bodies stand still while the block is held. Below the limit it falls with g - 2 μ
+    F/m. Limit: a contact is solved to the tolerance, relative to the free speed g dt of a step; its force is off by
+    this share of a jaw's weight.
     """
     mass, heavy, mu, fall = 1.0, 10.0, 0.5, {}
     for share in (1.01, 0.99):
@@ -148,15 +150,16 @@ def squeezed(on: Setting) -> Sequence[Check]:
     ]
 
 
-PUSHES = ((1.0, 1.0, 1.0), (1.5, 0.6, 0.9), (0.7, 1.4, 1.1), (1.2, 1.2, 0.5))  # along the three walls, in loads
+PUSHES = ((1.0, 1.0, 1.0), (1.5, 0.6, 0.9), (0.7, 1.4, 1.1), (1.2, 1.2, 0.5))  # forces into the three walls, in loads
 
 
 def pressed(on: Setting) -> Sequence[Check]:
-    """Pressed into a corner with 1e3 to 1e6 times its weight: the walls balance it; let go, no energy comes of it.
+    """The block is pressed into a corner by 1e3 to 1e6 weights: the walls balance it, and release adds no energy.
 
-    Statics: the sum of the wall forces is the load. A step is solved to the tolerance, relative to its free speed a dt
-    under the load: it moves by that share of a dt², which the next one finds, and by the slop. After the release the
-    block's energy may exceed that before by its weight over a slop.
+    Statics: the sum of the wall forces equals the load. Limit for the displacement: each step is solved to the
+    tolerance, relative to its free speed a dt under the load. So it moves the block by this share of a dt², which the
+    next step corrects, and by the slop. Limit for the energy after the release: that before, plus the block's weight
+    times a slop.
     """
     checks, balance, gain, wrong, slop = [], 0.0, 0.0, 0, on.slop * RADIUS
     for times in (1e3, 1e4, 1e5, 1e6):
@@ -181,11 +184,14 @@ def pressed(on: Setting) -> Sequence[Check]:
     ]
 
 
-CORNER = 50.0  # how far the corner is from the origin, along each axis [m]
+CORNER = 50.0  # distance of the corner from the origin along each axis [m]
 
 
 def _press(on: Setting, push: np.ndarray) -> tuple:
-    """Push the block into the corner for 2 s: (world, largest distance from its start [m], energies [J])."""
+    """Push the block into the corner with the force `push` (3,) [N] for 2 s.
+
+    Returns the world, the largest distance from the start [m], and the energies at the start and in the end [J].
+    """
     place = np.array(SIZE) / 2 - CORNER
     scene = boxed(block(tuple(place)), (CORNER,) * 3, 0.2, 0.5, (0, -GRAVITY, 0))
     world = on.world(scene)
@@ -197,13 +203,13 @@ def _press(on: Setting, push: np.ndarray) -> tuple:
 
 
 def painleve(on: Setting) -> Sequence[Check]:
-    """A rod slides on one end at θ, μ > (tanθ + 4 cotθ)/3: no force obeys Coulomb's law, and yet an answer is due.
+    """A rod slides on one end with μ > (tanθ + 4 cotθ)/3, where no contact force obeys Coulomb's law.
 
-    With A_nn = (1 + 3 cosθ (cosθ - μ sinθ))/m < 0 a contact force and its friction push the end in (Stewart,
-    *Rigid-body dynamics with friction and impact*, SIAM Review 42, 2000, section 1; the bound is A_nn = 0). The answer
-    must be finite, must not penetrate, and must not gain energy. Where forces are looked for (event-driven) the report
-    says that an impulse had to do (`fallbacks`); time stepping asks for impulses, for which there is no paradox
-    (Stewart, Trinkle).
+    With A_nn = (1 + 3 cosθ (cosθ - μ sinθ))/m < 0, a contact force and its friction accelerate the end into the floor;
+    the bound is A_nn = 0 (Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42, 2000, section 1).
+    The state must be finite, without penetration, and must not gain energy. The event-driven scheme solves for forces,
+    so its report must say that an impulse replaced them (`fallbacks`). Time stepping solves for impulses, for which
+    there is no paradox (Stewart, Trinkle).
     """
     length, thin, mass, theta = 2.0, 1e-3, 1.0, math.radians(63.4)
     mu = 1.3 * (math.tan(theta) + 4 / math.tan(theta)) / 3
@@ -236,11 +242,12 @@ def painleve(on: Setting) -> Sequence[Check]:
 
 
 def kane(on: Setting) -> Sequence[Check]:
-    """A rod hits obliquely with friction, so that its end slips, stops and slips back: energy must not grow.
+    """A rod hits the floor obliquely with friction, so that its slip reverses: no energy may be gained.
 
-    Kane and Levinson, *Dynamics: Theory and Applications*, 1985: Newton's restitution with Coulomb friction can make
-    energy where slip reverses (Stronge, *Impact Mechanics*, section 3.5). Angles of 10° to 80°, four speeds along the
-    floor, three μ, e = 0, 0.5, 1. A contact problem is solved to the tolerance: twice that share of the energy.
+    Newton's restitution with Coulomb friction can create energy where the slip reverses (Kane and Levinson, *Dynamics:
+    Theory and Applications*, 1985; Stronge, *Impact Mechanics*, section 3.5). The case runs angles of 10° to 80°, four
+    speeds along the floor, three μ, and e = 0, 0.5, 1. Limit: a contact problem is solved to the tolerance, which is
+    twice that share of the energy.
     """
     length, thin, mass, worst = 2.0, 1e-6, 1.0, {0.0: -math.inf, 0.5: -math.inf, 1.0: -math.inf}
     across = mass * length**2 / 12

@@ -1,4 +1,4 @@
-"""Hard cases of one impact: a corner, the end of a rod, a vertex, a whole face, a bullet."""
+"""Hard cases of a single impact: into a corner, with the end of a rod, a vertex or a whole face, and a fast bullet."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ from rigid_env.hard_cases.cases.scenery import (
     on_floor,
 )
 
-HEIGHT = 1.0  # from which bodies are dropped [m]
+HEIGHT = 1.0  # height from which bodies are dropped [m]
 
 
 def corner(on: Setting) -> Sequence[Check]:
-    """A sphere into the corner of three walls at right angles, e = 1, μ = 0: v' = -v, whichever wall comes first.
+    """A sphere flies into the corner of three perpendicular walls, e = 1, μ = 0: v' = -v, whichever wall it hits first.
 
-    Each wall turns round the speed along its normal and no other; so do two or three of them at once, being
-    independent. Three speeds in all orders of the walls, then two and three equal ones, which hit at one moment.
+    Each wall reverses only the velocity along its normal. Two or three walls at once do the same, since they are
+    independent. The case runs three different speeds in all orders of the walls, then two and three equal speeds, for
+    which the sphere hits several walls at one moment.
     """
     half, wrong = 3.0, 0.0
     aims = [*permutations((-3.0, -2.0, -1.0)), (-2.0, -2.0, -1.0), (-2.0, -2.0, -2.0), (-2.0, -2.0, 0.0)]
@@ -45,17 +46,20 @@ def _until_all_have_hit(aim, room: float) -> float:
 
 
 def _signed(world, aim, room: float) -> np.ndarray:
-    """Velocity, turned back once for each further hit: a far wall may send the sphere into the corner again."""
+    """Velocity of the sphere just after the corner: each further hit, which a far wall makes possible, is reversed.
+
+    `aim` is the velocity before, and `room` the distance from the middle to a wall, less the radius [m].
+    """
     hits = np.floor((np.abs(aim) * world.time + room) / (2 * room))
     return world.linvel[0, 0] * np.where(np.mod(hits, 2) == 0, -1.0, 1.0)
 
 
 def superball(on: Setting) -> Sequence[Check]:
-    """A sphere with tangential restitution e_t: its point of contact leaves at -e_t times its slip u = v + ω x (-r n).
+    """A sphere with tangential restitution e_t: its contact point leaves at -e_t times its slip u = v + ω x (-r n).
 
-    The impulse J along the wall changes v by J/m and ω by (-r n) x J/I, I = (2/5) m r², and u by (7/2) J/m: so
+    The impulse J along the wall changes v by J/m, ω by (-r n) x J/I with I = (2/5) m r², and u by (7/2) J/m. So
     Δv = -(2/7)(1+e_t) u, and r Δω is 5/2 of it (R. L. Garwin, *Kinematics of an ultraelastic rough ball*, Am. J. Phys.
-    37, 1969). Friction is large enough for all of it. A handful of rounded numbers of size 10.
+    37, 1969). The friction coefficient is large enough for this impulse. Limit: a few rounded numbers of size 10.
     """
     radius, e, worst, worst_spin = 0.5, 0.6, 0.0, 0.0
     v, w, n = np.array([3.0, -4.0, 1.0]), np.array([0.5, 2.0, -3.0]), np.array([0.0, 1.0, 0.0])
@@ -74,11 +78,12 @@ def superball(on: Setting) -> Sequence[Check]:
 
 
 def rod(on: Setting) -> Sequence[Check]:
-    """A thin rod at θ to the floor falls on one end, μ = 0: J = (1+e)mv/(1+3cos²θ), ω = 6(1+e)v cosθ/(L(1+3cos²θ)).
+    """A thin rod falls on one end at θ, μ = 0: J = (1+e)mv/(1+3cos²θ), ω = 6(1+e)v cosθ/(L(1+3cos²θ)).
 
     The end is L/2 cosθ beside the centre, so that 1/W = m/(1 + (L/2 cosθ)² m/I) with I = m L²/12 (Beer and Johnston,
-    *Dynamics*, section 17.3). A block of a thickness of 1e-9 L stands for the rod: with its end's vertices that far
-    from the axis, results are off by that share. Its moment about the axis, which the motion does not see, is I/2.
+    *Dynamics*, section 17.3). A block with the thickness 1e-9 L replaces the rod. The vertices of its end are that far
+    from the axis, so results are off by this share. Its moment of inertia about the rod's axis, which has no effect, is
+    I/2.
     """
     mass, length, thin, speed, worst_impulse, worst_spin = 2.0, 1.5, 1e-9, 1.2, 0.0, 0.0
     across = mass * length**2 / 12
@@ -101,10 +106,10 @@ def rod(on: Setting) -> Sequence[Check]:
 
 
 def vertex(on: Setting) -> Sequence[Check]:
-    """One vertex of the block hits: J = -(1+e) v_n/(1/m + n·(I⁻¹(r x n) x r)), momenta change by J n and r x J n.
+    """The block hits with one vertex: J = -(1+e) v_n/(1/m + n·(I⁻¹(r x n) x r)); momenta change by J n and r x J n.
 
-    Witkin and Baraff, *Physically Based Modeling*, "Rigid Body Simulation II", eq. 8-18. A handful of rounded numbers
-    of size 30. After it the block flies, without gravity, and keeps its momenta until the step ends.
+    Witkin and Baraff, *Physically Based Modeling*, "Rigid Body Simulation II", eq. 8-18. After the impact the block
+    flies without gravity, and keeps its momenta until the step ends. Limit: a few rounded numbers of size 30.
     """
     turn = np.array([math.cos(0.35), math.sin(0.35) / math.sqrt(2), math.sin(0.35) / math.sqrt(2), 0.0])
     v, w, n = np.array([0.4, -3.0, 0.2]), np.array([0.1, 0.0, -0.2]), np.array([0.0, 1.0, 0.0])
@@ -130,10 +135,10 @@ def vertex(on: Setting) -> Sequence[Check]:
 
 
 def flat_landing(on: Setting) -> Sequence[Check]:
-    """The block lands on a face, four contacts at once: no spin, no tilt, no sideways speed, not one bit of them.
+    """The block lands on a face, four contacts at once: no spin, no tilt and no sideways speed, to the last bit.
 
-    By symmetry the four impulses are equal, and each of their moments has its opposite. At rest the four forces are
-    m g/4, to the last bit the same.
+    By symmetry the four impulses are equal, and their moments cancel in pairs. At rest the four forces are m g/4, equal
+    to the last bit.
     """
     wrong, uneven, weight = 0, 0.0, 0.0
     for e in (0.0, 0.5, 1.0):
@@ -155,10 +160,10 @@ def flat_landing(on: Setting) -> Sequence[Check]:
 
 
 def bullet(on: Setting) -> Sequence[Check]:
-    """A cube of 2 cm flies at 500 m/s at a wall, e = 1: no miss, it turns round at the time x/v.
+    """A cube of 2 cm flies at 500 m/s at a wall, e = 1: it never passes through, and rebounds at the time x/v.
 
-    Reflected at the wall its place is the path folded there. An impact is made within half a slop of the wall, which
-    moves what follows by twice that.
+    Its position is its straight path, folded at the wall. Limit: the impact happens within half a slop of the wall,
+    which shifts the path after it by twice that.
     """
     speed, edge, worst, missed = 500.0, 0.02, 0.0, 0
     for reach in np.linspace(1.0, 40.0, 27):

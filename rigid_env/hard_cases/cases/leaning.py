@@ -1,4 +1,4 @@
-"""Leaning bodies: cards, a ladder, dominoes."""
+"""Hard cases of leaning bodies: two cards, a ladder, and a row of dominoes."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases import stacks
 from rigid_env.hard_cases.cases.stacks import G
 
-# Share by which the condition for holding is met or missed.
+# Share by which friction is above or below the limit for holding.
 NEAR = 0.01
 
 
 def turned(angle: float) -> tuple[float, float, float, float]:
-    """Quaternion of a turn about z [rad]."""
+    """Quaternion (4,), w first, of a rotation about z by `angle` [rad]."""
     return (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def cards(setting: Setting) -> list[Check]:
-    """Two cards of length L and thickness t lean on each other, φ from the vertical, on a floor with μ.
+    """Two cards of length L and thickness t lean on each other, φ from the vertical, on a floor with friction μ.
 
-    Each stands on its lower inner edge; the inner upper edges touch. By symmetry they push each other horizontally,
-    with H; a card's foot carries m g and the friction H. Both edges lie on the inner face, so the way from foot to apex
-    is L along the card, and its centre L/2 along it and t/2 off it. Moments about the foot:
+    Each card stands on its lower inner edge, and the inner upper edges touch. By symmetry the cards push each other
+    horizontally, with H. The foot of a card carries m g and the friction H. Both edges lie on the inner face: the apex
+    is L along the card from the foot, and the centre is L/2 along it and t/2 off it. Moments about the foot:
 
         H L cosφ = m g (L/2 sinφ - t/2 cosφ),   H = m g (½ tanφ - t/(2 L)),
 
-    and the foot holds iff μ >= ½ tanφ - t/(2 L). Run at 1 % above and below, φ = 20°, t = L/100, for 3 s. Standing: one
-    slop of a card at each of three interfaces. Falling from 1 % short: the feet accelerate by 1 % of μ g = 0.18 g at
-    least, so that they are more than 1 mm away after ½ 0.0018 g t² with t = 0.34 s.
+    so the foot holds iff μ >= ½ tanφ - t/(2 L). The case runs 1 % above and below, with φ = 20° and t = L/100, for 3 s.
+    Limit for standing: one slop of a card at each of three interfaces. Limit for falling 1 % below: the feet accelerate
+    by at least 1 % of μ g = 0.18 g, so they have moved by more than 1 mm after ½ 0.0018 g t² with t = 0.34 s.
 
-    At edges that lie in each other any direction between the two faces' normals is a normal; horizontal is in their
-    middle.
+    Where two edges touch, every direction between the two faces' normals is a possible contact normal; the horizontal
+    is in the middle of them.
     """
     angle, length, thickness = math.radians(20.0), 1.0, 0.01
     limit = 0.5 * math.tan(angle) - thickness / (2 * length)
@@ -56,20 +56,20 @@ def cards(setting: Setting) -> list[Check]:
 
 
 def ladder(setting: Setting) -> list[Check]:
-    """A ladder of length L and thickness t against a wall, θ from the floor, μ at both ends.
+    """A ladder of length L and thickness t leans against a wall, θ from the floor, with friction μ at both ends.
 
-    It touches floor and wall with edges of its lower face: the way between them is L along the ladder, and its centre
-    L/2 along it and t/2 above that face. At the limit both ends slip: the floor pushes N and rubs μ N, which is the
-    push of the wall; that rubs μ² N: N (1 + μ²) = m g. Moments about the foot:
+    It touches floor and wall with edges of its lower face. They are L apart along the ladder; the centre is L/2 along
+    it and t/2 above that face. At the limit both ends slip: the floor pushes with N and rubs with μ N, which balances
+    the push of the wall. The wall rubs with μ² N, so N (1 + μ²) = m g. Moments about the foot:
 
         m g (L/2 cosθ - t/2 sinθ) = μ N L sinθ + μ² N L cosθ,
         tanθ = (1 - μ²) / (2 μ + (t/L) (1 + μ²)).
 
-    Run with tanθ 0.1 % above and below, μ = 0.5, for 5 s. Holding: where nothing moves the forces are not unique, and
-    iterated to the tolerance; the velocity left is at most the tolerance times the free speed g h, every step, all in
-    one direction at worst: tolerance * g h * 5 s. Slipping: the forces lack 0.1 % of the weight's moment, which turns
-    it by α = 0.001 (m g L/2 cosθ)/(m L²/3) or more, its centre is ½ α 5² L/2 and more away: centimetres. (It lies
-    before.)
+    The case runs tanθ 0.1 % above and below, with μ = 0.5, for 5 s. Limit for holding: without motion the forces are
+    not unique, and the solver iterates to the tolerance. The velocity left in a step is at most the tolerance times the
+    free speed g h, in the worst case always in one direction: tolerance * g * h * 5 s. Limit for slipping: the forces
+    lack 0.1 % of the weight's moment. This rotates the ladder by at least α = 0.001 (m g L/2 cosθ)/(m L²/3), so its
+    centre moves by at least ½ α 5² L/2, which is centimetres, unless it lies on the floor before.
 
     References
     ----------
@@ -94,12 +94,13 @@ def ladder(setting: Setting) -> list[Check]:
 
 
 def dominoes(setting: Setting) -> list[Check]:
-    """Twenty dominoes 0.2 x 1 x 0.5 m, 0.6 m apart; the first one starts beyond its balance.
+    """Twenty dominoes stand in a row, and the first starts beyond its balance: all fall, in order.
 
-    It is in balance on its edge when tilted by atan(0.2/1) = 0.197 rad, and starts at 0.3 rad. A falling domino hits
-    the next one at 0.9 of its height (gap 0.4 m, height 1 m: √(1 - 0.4²) = 0.92), far above its centre, so that with
-    friction to hold its foot it is pushed over. Fallen: its centre, 0.51 m high at the top of its way, is below 0.45 m.
-    They fall in order, all within 10 s. A quick run to an error has eight.
+    They are 0.2 x 1 x 0.5 m, 0.6 m apart. A domino is balanced on its edge at a tilt of atan(0.2/1) = 0.197 rad; the
+    first starts at 0.3 rad. A falling domino hits the next one at 0.9 of its height: the gap is 0.4 m, the height 1 m,
+    and √(1 - 0.4²) = 0.92. This is far above the centre, so the next one is pushed over if friction holds its foot. A
+    domino counts as fallen when its centre, which passes 0.51 m at the top of its way, is below 0.45 m. All must fall
+    within 10 s. A quick run with error control has eight.
     """
     tilt = 0.15
     first = physics.Block((0.2, 1, 0.5), 1.0, pos=(0.1, 0.55, 0), quat=(math.cos(tilt), 0, 0, -math.sin(tilt)))

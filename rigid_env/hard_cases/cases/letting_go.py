@@ -1,4 +1,4 @@
-"""Hard cases of contacts that end, and of one that slides and sticks again, all in motion."""
+"""Hard cases of moving bodies whose contact ends, or slides and sticks again."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
 from rigid_env.hard_cases.cases.scenery import EPS, FLOOR, laws, on_floor, turned
 
 LEFT = physics.HalfSpace((1, 0, 0))
-LOOKS = 400  # at a push along its way, for the first sign
+LOOKS = 400  # angles at which a wall's push is evaluated, to find where it changes sign
 
 
 class Release(NamedTuple):
-    """Release of a body that turns by an angle about z: [s], [rad], [rad/s]."""
+    """Release of a body from a wall: time [s], angle about z [rad] and its rate [rad/s]."""
 
     time: float
     angle: float
@@ -30,9 +30,10 @@ class Release(NamedTuple):
 
 
 def _release(square: Callable, push: Callable, start: float, end: float) -> Release:
-    """Find the end of `push` between two angles, for ω² = `square`(angle); the time is ∫ dθ/ω.
+    """Release of a body that starts at rest or moving at the angle `start`: the first zero of a wall's push.
 
-    A body at rest at the start begins as the square root of the angle: with θ = start + s² the integrand is smooth.
+    `push` is the wall's force as a function of the angle, and `square` gives ω². The time is ∫ dθ/ω. A body at rest
+    moves as the square root of the angle at first; with θ = start + s² the integrand is smooth.
     """
     angles = np.linspace(start, end, LOOKS)[1:]
     first = next(k for k in range(1, len(angles)) if push(angles[k]) < 0.0)
@@ -47,16 +48,18 @@ def _release(square: Callable, push: Callable, start: float, end: float) -> Rele
 
 
 def _released(on: Setting, scene: physics.Scene, duration: float, wall: int) -> list[float]:
-    """Times at which `wall` lets the body go, to rounding [s]."""
+    """Times at which the body leaves `wall` in an event-driven simulation [s]."""
     found = physics.simulate(scene, duration, on.accuracy, on.dt)
     return [event.t for event in found.events if event.kind == "release" and event.wall == wall]
 
 
 def _time_checks(on: Setting, scene: physics.Scene, time: float, end: float, wall: int) -> list[Check]:
-    """Checks, event-driven: the body leaves once, at the right time.
+    """Checks that the body leaves `wall` once, at the right time; none for time stepping.
 
-    A push is off by ten times the tolerance at most (some ten steps, each to a hundredth of it, by what amplifies
-    them), in the weights by which it falls in the body's time; and 1e-10 s are a million units in the last place.
+    Limit: the wall's push is off by at most ten times the tolerance, in units of the body's weight: some ten steps,
+    each accurate to a hundredth of the tolerance, times a factor that amplifies errors. The push decreases by about the
+    weight within the time scale of the motion, so the time is off by the same share. 1e-10 s are a million units in the
+    last place.
     """
     if not on.is_event_driven:
         return []
@@ -69,15 +72,16 @@ def _time_checks(on: Setting, scene: physics.Scene, time: float, end: float, wal
 
 
 def lifts_off(on: Setting) -> Sequence[Check]:
-    """A smooth ellipsoid spun up on its flat side turns over its tip, and leaves the floor before.
+    """A smooth ellipsoid, spun up on its flat side, turns over its tip and leaves the floor before it is upright.
 
-    Half-axes a along, b up, y(θ) = √(a² sin²θ + b² cos²θ) the height of its centre. Nothing pushes it sideways, and
+    Its half-axes are a along and b up. The height of its centre is y(θ) = √(a² sin²θ + b² cos²θ). No force acts
+    sideways, so
 
         ½ (I + m y'²) ω² + m g y = ½ I ω₀² + m g b,    I = m (a² + b²)/5.
 
-    Where the push ends nothing turns it, so that y'' ω² = -g there; from there ω stays and the centre is on a parabola.
-    Time stepping is of second order in ω₀ dt: the angle is off by (ω₀ dt)² of the angle turned in all, the height by a
-    half of (ω₀ dt)² a.
+    Where the push of the floor ends, no torque acts, so y'' ω² = -g. From there ω stays, and the centre flies on a
+    parabola. Limits: time stepping is of second order in ω₀ dt. The angle is off by (ω₀ dt)² of the whole angle turned,
+    the height by half of (ω₀ dt)² a.
     """
     a, b, mass, spin, after = 0.3, 0.15, 2.0, 14.0, 0.05
     inertia, c = mass * (a * a + b * b) / 5, a * a - b * b
@@ -114,16 +118,19 @@ def lifts_off(on: Setting) -> Sequence[Check]:
 
 
 def ladder_leaves_wall(on: Setting) -> Sequence[Check]:
-    """A smooth ladder slides down between floor and wall, from rest, and leaves the wall before it lies.
+    """A smooth ladder slides down between floor and wall, from rest, and leaves the wall before it reaches the floor.
 
-    Length l, width w, θ from the floor; its lower side's ends touch: x = (l cosθ + w sinθ)/2, y = (l sinθ + w cosθ)/2,
+    It has length l, width w and the angle θ from the floor. The ends of its lower side touch floor and wall, so its
+    centre is at x = (l cosθ + w sinθ)/2, y = (l sinθ + w cosθ)/2, and
 
-        ½ (I + m (x'² + y'²)) ω² = m g (y₀ - y),    ω' from its derivative,
+        ½ (I + m (x'² + y'²)) ω² = m g (y₀ - y),    ω' from its derivative.
 
-    and the wall pushes m (x'' ω² + x' ω'). Where that ends the centre has its sideways speed for good. (Without width:
-    when the top has fallen by a third.) The centre would then be slowed at a rate j, so that the speed is off by
-    ½ j τ² if the wall lets go τ late: time stepping does by two steps, and where the gap, j τ³/6, is a slop. It is of
-    second order besides, by the share (ω dt)² of the speed, and each step is solved to the tolerance of it.
+    The wall pushes with m (x'' ω² + x' ω'). Where this push ends, the centre keeps its sideways velocity. (Without
+    width, this is where the top has fallen by a third.)
+
+    Limits: after that, the wall would slow the centre at a growing rate j, so the speed is off by ½ j τ² if the wall
+    lets go a time τ late. Time stepping is late by two steps, and until the gap, j τ³/6, is a slop. It is also of
+    second order, by the share (ω dt)² of the speed, and each step is solved to the tolerance of it.
     """
     length, width, mass, start, after = 2.0, 0.05, 3.0, 1.2, 0.1
     inertia = mass * (length**2 + width**2) / 12
@@ -163,8 +170,8 @@ def ladder_leaves_wall(on: Setting) -> Sequence[Check]:
     ]
 
 
-# A body that rolls, slips after 0.239 s and sticks again after 0.598 s: one of the truths in
-# tests/reference/data/restick.json, with which a test compares it. Place (x, z) and attitude are those where it sticks.
+# A body that rolls, slips after 0.239 s and sticks again after 0.598 s. The numbers are one of the truths in
+# tests/reference/data/restick.json; a test compares them. PLACE (x, z) and ATTITUDE are those at which it sticks.
 AXES = (0.22727779264751125, 0.2895599622404196, 0.1729424131088307)
 WEIGHS, FRICTION = 1.570155906823083, 0.24320126260951022
 START = (-0.6212756411284268, -0.7518774852481933, -0.04282437396923139, 0.21647840056564183)
@@ -175,7 +182,10 @@ ATTITUDE = (0.09177162849913442, -0.28764097420046436, -0.8476806777030572, 0.43
 
 
 def rolling_start(axes, quat, angvel) -> dict:
-    """Start of an ellipsoid on the floor whose lowest point stands still: r = -R D²Rᵀn/|D Rᵀn|, v = r x ω."""
+    """State of an ellipsoid that rolls on the floor, with its lowest point at rest, as arguments of a body.
+
+    The lowest point is at r = -R D²Rᵀn/|D Rᵀn| from the centre, and v = r x ω.
+    """
     w, *v = quat
     R = Rotation.from_quat([*v, w]).as_matrix()
     square = R @ np.diag(np.square(axes)) @ R.T
@@ -186,13 +196,15 @@ def rolling_start(axes, quat, angvel) -> dict:
 def sticks_again(on: Setting) -> Sequence[Check]:
     """An ellipsoid rolls until friction no longer holds it, slides for 0.36 s, and sticks again.
 
-    A slip that begins grows with the square of the time, and its direction follows what acts at a rate of 1/|u|: as
-    stiff as one likes; so it is again where it ends. The outcome is that of the equations of motion by Radau and
-    DOP853, in the time dσ = dt/|u| and with the slip u as a part of the state, right to 1e-13
-    (`tests/reference/restick.py`); place and attitude are compared at the time at which it sticks. Time stepping is of
-    second order in ω dt for both. Where friction opposes the slip at the end of a step (``slip="end"``) it is off by
-    what that turns in half a step, and for the time t of the slide the place by μ g t² times as much. Event-driven,
-    times are right to ten times the tolerance, and to the 1e-10 that rounding becomes in the slide.
+    A slip begins with the square of the time, and its direction changes at a rate of 1/|u|: the equations are
+    arbitrarily stiff there, and again where the slip ends. The known outcome is a solution of the equations of motion
+    by Radau and DOP853, with the time dσ = dt/|u| and the slip u as a part of the state, accurate to 1e-13
+    (`tests/reference/restick.py`). Position and attitude are compared at the time at which it sticks.
+
+    Limits: time stepping is of second order in ω dt for both. If friction opposes the slip at the end of a step
+    (``slip="end"``), its direction is off by the rotation in half a step. For a slide of the duration t this shifts the
+    position by μ g t² times that angle. Event-driven, times are accurate to ten times the tolerance, or to 1e-10, to
+    which the slide amplifies rounding.
     """
     body = physics.Ellipsoid(AXES, WEIGHS, **rolling_start(AXES, START, SPIN))
     scene = on_floor(body, 0.0, FRICTION)
@@ -213,7 +225,7 @@ def sticks_again(on: Setting) -> Sequence[Check]:
 
 
 def _stick_checks(on: Setting, scene: physics.Scene) -> list[Check]:
-    """Checks that the body slips once and sticks once, at the right times, without further events."""
+    """Check that the body slips once and sticks once, at the right times, without impacts and releases."""
     found = physics.simulate(scene, STICKS + 0.01, on.accuracy, on.dt)
     times = {kind: [event.t for event in found.events if event.kind == kind] for kind in ("slip", "stick")}
     late = {kind: times[kind][-1] if times[kind] else math.nan for kind in times}

@@ -1,4 +1,4 @@
-"""Piles that stand: masses far apart, towers, pyramids, overhangs; and 216 balls that fall."""
+"""Hard cases of piles: unequal masses, towers, pyramids and overhangs that stand, and 216 balls that fall."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases import stacks
 from rigid_env.hard_cases.cases.stacks import CUBE, G
 
-# Penetration that the published benchmark allows: sum over contacts of the squared depth [m²].
+# Penetration that the published benchmark allows: sum of the squared depths of all contacts [m²].
 BALLS_PENETRATION = 1.35e-4
 
 
 def heavy_on_light(setting: Setting) -> list[Check]:
-    """A cube of 1 to 1,000,000 kg on one of 1 kg, for a minute.
+    """A cube of 1 to 1,000,000 kg stands on a cube of 1 kg for a minute.
 
-    The interface carries the weight M g of what is above it, the floor (M + 1) g. The velocities of a contact problem
-    are off by its tolerance times the free speed g h, so in a load that is carried by masses of at most M + 1 kg the
-    force is off by at most tolerance * g * (M + 1) at each of eight contacts: 10 tolerances of the whole weight. Depth:
-    the slop at each of two interfaces.
+    The contacts between the cubes carry the weight M g of the upper one, and the floor carries (M + 1) g. Limits: the
+    velocities of a contact problem are off by its tolerance times the free speed g h. So the force on masses of at most
+    M + 1 kg is off by at most tolerance * g * (M + 1) at each of eight contacts: 10 tolerances of the whole weight. The
+    penetration is at most a slop at each of the two interfaces.
     """
     checks = []
     for top in (1.0, 1e2, 1e4, 1e6):
@@ -37,11 +37,11 @@ def heavy_on_light(setting: Setting) -> list[Check]:
 
 
 def towers(setting: Setting) -> list[Check]:
-    """Towers of 10, 20 and 50 cubes for a minute; one of 15 whose cubes are shifted by up to a hundredth.
+    """Towers of 10, 20 and 50 cubes stand for a minute, and one of 15 whose cubes are shifted by up to 1 %.
 
-    Cube k of n carries (n - k) g. Each interface may be off by the tolerance, relative to the free speed g h, for every
-    mass above it: n²/2 tolerances of m g, which is n tolerances of the whole weight n m g, at each of four contacts.
-    The shifts move no cube's centre of mass beyond an edge: the sum of what is above stays within 0.02 of the middle.
+    Cube k of n carries (n - k) g. Limit: each interface may be off by the tolerance, relative to the free speed g h,
+    for every mass above it. This is n²/2 tolerances of m g, or n tolerances of the whole weight n m g, at each of four
+    contacts. The shifts keep the centre of mass of all upper cubes within 0.02 of the middle, far from any edge.
     """
     checks = []
     duration = setting.pick(60.0, 5.0)
@@ -60,11 +60,11 @@ def towers(setting: Setting) -> list[Check]:
 
 
 def pyramids(setting: Setting) -> list[Check]:
-    """Pyramids with 10 and 20 cubes in the lowest row, cubes 0.02 m apart, for 5 s.
+    """Pyramids with 10 and 20 cubes in the lowest row, 0.02 m apart, stand for 5 s.
 
-    Every cube lies on two with almost half a face each: in balance by symmetry. The floor carries all of the weight;
-    each of its contacts is off by the tolerance times the free speed g h, times the masses that lean on it, the base at
-    most.
+    Every cube lies on two others, with nearly half a face on each, in balance by symmetry. The floor carries all of the
+    weight. Limit: each of its contacts is off by the tolerance times the free speed g h, times the masses that lean on
+    it, at most the base.
     """
     checks = []
     for base in setting.pick((10, 20), (10,)):
@@ -81,12 +81,12 @@ def pyramids(setting: Setting) -> list[Check]:
 
 
 def overhangs(setting: Setting) -> list[Check]:
-    """Five planks of length 1 m, each as far beyond the next as it may be.
+    """Five planks of length 1 m lie on each other, each as far beyond the next lower one as balance allows.
 
-    Let x_k be how far plank k from the top reaches beyond plank k + 1. The k planks from the top have their common
-    centre above that edge exactly if x_k = 1/(2 k): with the first k - 1 centred on the edge of plank k, at distance
-    1/2 from its centre, the common centre is 1/(2 k) from the edge. So the reach is (1/2) Σ 1/k. At 0.98 of every x_k
-    it stands, at 1.02 the top falls: to below the middle of the pile, 0.5 m.
+    Let x_k be the length by which plank k from the top extends beyond plank k + 1. The upper k planks have their common
+    centre above that edge exactly if x_k = 1/(2 k). (The upper k - 1 planks are centred on the edge of plank k, at
+    distance 1/2 from its centre; so the common centre is 1/(2 k) from the edge.) The whole reach is (1/2) Σ 1/k. With
+    0.98 of every x_k the pile stands. With 1.02 the top falls below the middle of the pile, 0.5 m.
     """
     checks = []
     for share in (0.98, 1.02):
@@ -108,13 +108,13 @@ def overhangs(setting: Setting) -> list[Check]:
 
 
 def balls(setting: Setting) -> list[Check]:
-    """6 x 6 x 6 balls of radius 0.5 m and 1 kg fall from 1 m, 0.1 m apart, at a tenth of the step (1 ms).
+    """6 x 6 x 6 balls of radius 0.5 m and 1 kg, 0.1 m apart, fall from 1 m, at a tenth of the step (1 ms).
 
-    e = 0, μ = 0: penetration is an error, and its sum of squares over all contacts is below what the benchmark allows
-    at every hundredth of a second of 10 s. e = 1: the energy stays; an impact whose contact problem is solved to the
-    tolerance is off by that share of the energy of the balls that it involves, so after n impacts per ball by n
-    tolerances. A ball has about 1 impact with each neighbour per fall of 0.1 m, 0.14 s; 26 neighbours: 2000 in 10 s.
-    A quick run to an error has 3 x 3 x 3 balls, and their share of the penetration.
+    With e = 0 and μ = 0, penetration is the error: its sum of squares over all contacts must be below the benchmark's
+    limit at every hundredth of a second of 10 s. With e = 1 the energy must stay. An impact whose contact problem is
+    solved to the tolerance is off by this share of the energy of its balls, so n impacts per ball lead to n tolerances.
+    A ball has about 1 impact with each of 26 neighbours per fall of 0.1 m, which takes 0.14 s: 2000 in 10 s. A quick
+    run with error control has 3 x 3 x 3 balls, and their share of the allowed penetration.
 
     The starting columns are in unstable balance: balls of a layer are moved by up to 0.01 m along x and z (seed 0).
 
@@ -141,7 +141,7 @@ def balls(setting: Setting) -> list[Check]:
             faults += int(report.faults[0] + report.left_out[0])
         checks.append(none_of(f"e = {restitution:g}: faults and contacts left out", faults))
         if restitution == 0.0:
-            share = (side / 6) ** 3  # of the balls that the benchmark's limit is for
+            share = (side / 6) ** 3  # number of balls, relative to the benchmark's
             checks.append(Check("e = 0: sum of squared depths", worst, share * BALLS_PENETRATION, "m²"))
         else:
             drift = abs(_energy(world) / energy - 1)
@@ -155,7 +155,7 @@ def _energy(world: physics.World) -> float:
 
 
 def squared_depths(pos: np.ndarray, radius: float) -> float:
-    """Sum of the squared depths of balls at `pos` (n, 3) in each other and in the floor y = 0 [m²]."""
+    """Sum of the squared penetrations of balls at `pos` (n, 3) [m] into each other and into the floor y = 0 [m²]."""
     first, second = np.triu_indices(len(pos), 1)
     offset = pos[first] - pos[second]
     between = 2 * radius - np.sqrt((offset * offset).sum(axis=1))

@@ -1,4 +1,4 @@
-"""Random scenes, parameters, states and wrenches of many worlds; `random_scenes` holds them against laws."""
+"""Draw random scenes, parameters, states and wrenches for many worlds; `random_scenes` checks laws in them."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import numpy as np
 import physics
 from physics.kernels.state import layout as at
 
-HALF_WIDTH = 10.0  # of the closed box that all scenes are in [m]
-CELL = 5.0  # distance of the places from which several bodies start [m]
-LARGEST_EDGE = 2.7  # [m]: a block of it has a bounding radius of 2.34 m and turns within its cell
+HALF_WIDTH = 10.0  # half width of the closed box that contains each scene [m]
+CELL = 5.0  # distance between the places at which several bodies start [m]
+LARGEST_EDGE = 2.7  # [m] a cube with this edge has a bounding radius of 2.34 m, so it can turn within its cell
 
-# Exponents of the strongest force by weight, and torque by weight and radius. Torques are weaker for the time a run
-# takes, not for what comes out: the exact rotation is cut into parts of 0.06 rad, millions of them in a step at 1e7
-# rad/s.
+# Exponents of the strongest force over weight, and of the strongest torque over weight times radius. Torques are weaker
+# only to save time: the exact rotation is made in parts of 0.06 rad, millions of them in a step at 1e7 rad/s.
 STRONGEST_FORCE, STRONGEST_TORQUE = 6, 3
 
 WALLS = tuple(
@@ -34,28 +33,28 @@ BODIES = {
 
 
 def scene_of(family: str) -> physics.Scene:
-    """Scene of a family of `BODIES`, which fixes the plan; all its numbers are drawn anew."""
+    """Scene of a family of `BODIES`; it fixes which kernels run, and `begin` replaces all of its numbers."""
     effects = [physics.Gravity(), physics.Contact(0.0), physics.Friction(0.0)]
     return physics.Scene(BODIES[family], WALLS, effects)
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float, shape) -> np.ndarray:
-    """10**x with x uniform between `low` and `high`."""
+    """Draw 10**x with x uniform between `low` and `high`."""
     return 10.0 ** rng.uniform(low, high, shape)
 
 
 def directions(rng: np.random.Generator, shape: tuple[int, ...], size: int = 3) -> np.ndarray:
-    """Unit vectors (..., size), uniform on the sphere."""
+    """Draw unit vectors (..., size), uniform on the sphere; `shape` are the leading axes."""
     v = rng.normal(size=(*shape, size))
     return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def begin(world: physics.World, rng: np.random.Generator) -> None:
-    """Draw every parameter and state of a world of `scene_of` anew.
+    """Draw all parameters and states of the worlds of a scene from `scene_of`.
 
-    Edges 0.1 to 2.7 m, masses 1e-3 to 1e3 kg, gravity 0.01 to 10 m/s² in any direction, speeds 0.01 to 100 m/s, spins
-    0.01 to 1000 rad/s. A third of the worlds is smooth with any restitution, a third rough (μ up to 2) and plastic, a
-    third both rough and bouncing.
+    Edges are 0.1 to 2.7 m, masses 1e-3 to 1e3 kg, gravity 0.01 to 10 m/s² in any direction, speeds 0.01 to 100 m/s,
+    spins 0.01 to 1000 rad/s. A third of the worlds has no friction and any restitution, a third has friction (μ up to
+    2) and no restitution, and a third has both.
     """
     bodies, shape = world.scene.bodies, (world.worlds, world.body_count)
     size = log_uniform(rng, -1.0, np.log10(LARGEST_EDGE), (*shape, 3))
@@ -67,7 +66,7 @@ def begin(world: physics.World, rng: np.random.Generator) -> None:
     restitution = np.where(kind == 1, 0.0, rng.uniform(0.0, 1.0, world.worlds))
     gravity = log_uniform(rng, -2, 1, (world.worlds, 1)) * directions(rng, (world.worlds,))
     middle = np.broadcast_to([body.pos for body in bodies], (*shape, 3))
-    world.set_state(pos=middle)  # where whatever size comes has room
+    world.set_state(pos=middle)  # places at which bodies of any size have room
     world.set_parameters(
         mass=log_uniform(rng, -3, 3, shape), size=size, gravity=gravity,
         friction=np.repeat(friction[:, None], world.body_count, 1),
@@ -82,7 +81,7 @@ def begin(world: physics.World, rng: np.random.Generator) -> None:
 
 
 def _places(rng: np.random.Generator, world: physics.World, size: np.ndarray) -> np.ndarray:
-    """Draw starts of bodies (worlds, bodies, 3): one anywhere in the box, several each in a cell of its own."""
+    """Draw starting positions (worlds, bodies, 3) [m]: one body anywhere in the box, several in separate cells."""
     if world.body_count == 1:
         return (HALF_WIDTH - 0.5 * np.linalg.norm(size, axis=-1, keepdims=True)) * rng.uniform(-1, 1, size.shape)
     cells = CELL * (np.array(list(np.ndindex(3, 3, 3))) - 1.0)
@@ -91,10 +90,10 @@ def _places(rng: np.random.Generator, world: physics.World, size: np.ndarray) ->
 
 
 def draw_wrench(world: physics.World, rng: np.random.Generator) -> np.ndarray:
-    """Draw wrenches (worlds, bodies, 6): forces of 0.01 to 1,000,000 times the weight.
+    """Draw wrenches (worlds, bodies, 6): forces [N] of 0.01 to 1,000,000 times the weight, and torques [N m].
 
-    Torques go up to 1,000 times the weight by the radius.
-    Strong ones are rarer: the exponent is -2 + 8 u⁴ with u uniform, above 5 in 3 % of the draws.
+    Torques go up to 1,000 times the weight times the radius. Strong forces are rarer: the exponent is -2 + 8 u⁴ with u
+    uniform, which is above 5 in 3 % of the draws.
     """
     shape = (world.worlds, world.body_count, 1)
     weight = (1.0 / world.params[:, at.INV_MASS]).reshape(shape) * np.linalg.norm(world.gravity, axis=-1)[:, None, None]

@@ -1,6 +1,7 @@
-"""Hard case of random scenes, parameters, states and wrenches: many worlds at once, checked against laws.
+"""Hard case of random scenes, parameters, states and wrenches in many worlds at once, checked against laws.
 
-`random_draws` draws them, also for `benchmarks.soak`, for as long as one likes.
+The functions that draw are in `random_draws`. The program `benchmarks.soak` runs such scenes for as long as the user
+likes.
 """
 
 from __future__ import annotations
@@ -17,26 +18,26 @@ from physics.kernels.state import layout as at
 from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases.random_draws import HALF_WIDTH, begin, draw_wrench, scene_of
 
-# Share of its energy from which on a gain is gross.
+# Share of its energy from which on a gain is so large that the world is stopped.
 GROSS = 1e-3
 
-# Steps with one wrench, then with another, then without any.
+# Number of steps with each of two wrenches, and of steps without a wrench after them.
 PUSHED, FREE = 5, 20
 
 
 @dataclass(frozen=True)
 class Look:
-    """Quantities of the laws at one moment, each (worlds,) but for `gap`."""
+    """Quantities at one moment that the laws are about, each an array (worlds,)."""
 
     kinetic: np.ndarray  # [J]
     energy: np.ndarray  # kinetic and potential [J]
-    size: np.ndarray  # kinetic, and depth of gravity's potential over the box [J]: what an energy is rounded by
+    size: np.ndarray  # scale of the energy's rounding: kinetic energy, and gravity's potential over the box [J]
     escaped: np.ndarray  # depth of the deepest centre of mass behind a wall [bounding radii], 0 where inside
     is_finite: np.ndarray
 
 
 def look(world: physics.World) -> Look:
-    """Quantities of the laws in the present state of the worlds."""
+    """Compute the quantities that the laws are about, for the present state of the worlds."""
     about = physics.diagnose(world)
     mass = (1.0 / world.params[:, at.INV_MASS]).reshape(world.worlds, -1)
     depth = np.abs(world.pos).max(axis=-1) - HALF_WIDTH
@@ -51,10 +52,10 @@ def look(world: physics.World) -> Look:
 
 
 def push(world: physics.World, wrench: np.ndarray) -> np.ndarray:
-    """Bound (worlds,) of the growth of √(2 K) by a second of these wrenches and gravity [√W·√s / s].
+    """Upper bound (worlds,) of the growth of √(2 K) per second under these wrenches and gravity [√W/√s].
 
-    With A² = Σ |F + m g|²/m + |τ|²/I_min, dK/dt = Σ (F + m g)·v + τ·ω <= A √(2 K) by Cauchy and Schwarz, as
-    2 K = Σ m v² + ω·I ω. So d√(2 K)/dt <= A, whatever contacts do, which only take.
+    With A² = Σ |F + m g|²/m + |τ|²/I_min, dK/dt = Σ (F + m g)·v + τ·ω <= A √(2 K) by the Cauchy-Schwarz inequality, as
+    2 K = Σ m v² + ω·I ω. So d√(2 K)/dt <= A, with any contacts, which only take energy.
     """
     lightness = world.params[:, at.INV_MASS].reshape(world.worlds, -1)
     turning = world.params[:, at.INV_INERTIA : at.INV_INERTIA + 3].max(axis=1).reshape(lightness.shape)
@@ -64,7 +65,7 @@ def push(world: physics.World, wrench: np.ndarray) -> np.ndarray:
 
 
 def _put_away(world: physics.World, lost: np.ndarray) -> None:
-    """Put these worlds at rest in the middle of the box, bodies apart."""
+    """Put the worlds with the indices `lost` at rest: bodies in the middle of the box, apart from each other."""
     shape = (len(lost), world.body_count, 3)
     places = np.broadcast_to([body.pos for body in world.scene.bodies], shape)
     world.set_state(pos=places, linvel=np.zeros(shape), angvel=np.zeros(shape), worlds=lost)
@@ -72,14 +73,15 @@ def _put_away(world: physics.World, lost: np.ndarray) -> None:
 
 @dataclass
 class Outcome:
-    """Faults of each of the worlds so far, each (worlds,).
+    """Violations of laws in each world so far, as arrays (worlds,).
 
     Attributes
     ----------
     gain : float64
-        Energy beyond what was put in, as a share of `Look.size`: of √(2 K) while pushed, of all energy while free.
+        Largest energy gain beyond the work of wrenches, as a share: of √(2 K) under a wrench, of `Look.size` without
+        one.
     escaped : float64
-        Deepest place of a centre of mass behind a wall [bounding radii].
+        Largest depth of a centre of mass behind a wall [bounding radii].
     is_broken : bool
         A state that is not finite, a fault, or contacts left out.
     """
@@ -90,15 +92,15 @@ class Outcome:
 
     @classmethod
     def start(cls, worlds: int) -> Outcome:
-        """Outcome of worlds without any fault."""
+        """Outcome without violations, for this number of worlds."""
         return cls(np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, dtype=np.bool_))
 
     def broken_laws(self, limit: float) -> np.ndarray:
-        """Worlds (worlds,) bool that broke a law, a gain above `limit` included."""
+        """Flags (worlds,) bool of the worlds that have violated a law; a gain counts above `limit`."""
         return self.is_broken | (self.escaped > 0) | (self.gain > limit)
 
     def law(self, index: int, limit: float) -> str:
-        """Name the law that one world broke; empty where it broke none."""
+        """Name of the law that one world has violated; empty if it has violated none."""
         if self.is_broken[index]:
             return "not finite, a fault, or contacts left out"
         if self.escaped[index] > 0:
@@ -106,7 +108,18 @@ class Outcome:
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
-        """Check a step against the laws, and return the state after it. `push_now`: see `push`; None: no wrench."""
+        """Check the last step against the laws, and return the quantities after it.
+
+        Parameters
+        ----------
+        world : World
+        before : Look
+            Quantities before the step.
+        push_now : (worlds,) float64 or None
+            Result of `push` for the step's wrench; None: no wrench.
+        dt : float
+            Length of the step [s].
+        """
         now, report = look(world), world.report
         self.is_broken |= ~now.is_finite | (report.faults > 0) | (report.left_out > 0)
         np.maximum(self.escaped, now.escaped, out=self.escaped)
@@ -119,7 +132,7 @@ class Outcome:
 
 
 def gain_limit(accuracy: Preset | physics.Accuracy) -> float:
-    """Share of the energy by which a step may be off; derived in `random_scenes`."""
+    """Largest relative energy gain that a step at this accuracy may have; derived in `random_scenes`."""
     knobs = resolve(accuracy)
     return 4 * knobs.tolerance * (knobs.impacts + 1)
 
@@ -129,19 +142,24 @@ def drive(
     rng: np.random.Generator,
     told: Callable[[int, str], None] = lambda index, law: None,
 ) -> Outcome:
-    """Draw all worlds of a batch anew and run them under one wrench, another wrench, and none.
+    """Draw all worlds of a batch and run them under one wrench, then another wrench, then none.
 
     Parameters
     ----------
     world : World
-        Of `scene_of`.
+        Worlds of a scene from `scene_of`.
     rng : numpy.random.Generator
     told : callable, optional
-        Given each world that breaks a law, and the law, right after the step in which it first does.
+        Called with the index of each world that violates a law and the name of the law, after the first step in which
+        it does.
+
+    Returns
+    -------
+    Outcome
 
     Notes
     -----
-    A world that has gained more than `GROSS` is put to rest: it would go on gaining, and be slow.
+    A world that has gained more than `GROSS` is put at rest: it would gain more and more, and be slow.
     """
     begin(world, rng)
     outcome = Outcome.start(world.worlds)
@@ -163,25 +181,27 @@ def drive(
     return outcome
 
 
-# Families, and how many worlds of each a thorough run has; a batch is one call of `drive`.
+# Number of worlds of each family in a thorough run, and number of worlds in one call of `drive`.
 SHARES = {"block": 40_000, "ellipsoid": 40_000, "bodies": 20_000}
 BATCH = 1000
 
 
 def random_scenes(setting: Setting) -> list[Check]:
-    """100,000 worlds with everything drawn at random (`begin`, `draw_wrench`), 30 steps each.
+    """100,000 worlds with everything drawn at random (`begin`, `draw_wrench`) violate no law in 30 steps each.
 
-    Never: a state that is not finite, a fault, contacts left out, an exception (it would end the run), a centre of mass
-    behind a wall. Energy: a contact problem is solved to the tolerance, relative to its largest free contact speed u,
-    so that an impulse of at most 2 m u is off by that share of it, and the energy by 4 tolerances of ½ m u² at most. A
-    step has as many as it may have impacts (`Accuracy.impacts`), and the resting stage. What overlaps is pushed apart
-    without a velocity, which moves it by twice the slop in the field of gravity and so turns it by as much of a radian
-    (body on body, where its energy is that of its angular momentum in the new attitude).
+    Forbidden are a state that is not finite, a fault, contacts left out, an exception (which would end the run), and a
+    centre of mass behind a wall.
 
-    To an error (`precise`, `reference`) a smooth step is off by a tolerance of speed, and by two of the energy, at most
-    as much as a contact problem; a part of a step of several bodies has its own problems. The limit is for as many of
-    them as a step may have impacts, 10,001. Most have hundreds; where a body rattles it is millions, and the limit the
-    same.
+    Limit for the energy: a contact problem is solved to the tolerance, relative to its largest free contact speed u. So
+    an impulse of at most 2 m u is off by this share of it, and the energy by at most 4 tolerances of ½ m u². A step has
+    at most `Accuracy.impacts` such problems, and one in the resting stage. Overlapping bodies are pushed apart without
+    a velocity. This moves them by twice the slop in the field of gravity, and rotates them by as much of a radian. (For
+    body on body, the energy after that is that of the angular momentum in the new attitude.)
+
+    With error control (`precise`, `reference`) a smooth step is off by a tolerance of the speed, and by two of the
+    energy, at most as much as a contact problem. A part of a step of several bodies has contact problems of its own.
+    The limit is for as many of them as a step may have impacts, 10,001. Most steps have hundreds. A rattling body has
+    millions, and the limit is still the same.
     """
     limit = gain_limit(setting.accuracy)
     checks, scale = [], setting.pick(1.0, 0.004)

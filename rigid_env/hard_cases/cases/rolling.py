@@ -1,4 +1,4 @@
-"""Hard cases of rolling: a sphere that starts to roll, a disk on its rim."""
+"""Hard cases of rolling: a sphere that starts to roll, a disk on its rim, an ellipsoid that rolls and rocks."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from rigid_env.hard_cases.cases.scenery import (
 
 
 def rolling(on: Setting) -> Sequence[Check]:
-    """A sphere set down sliding at v₀ rolls from t = 2 v₀/(7 μ g) on, at 5 v₀/7, and stays so.
+    """A sphere starts with the speed v₀ without spin; from t = 2 v₀/(7 μ g) on it rolls at 5 v₀/7.
 
     m v̇ = -μ m g and (2/5) m r² ω̇ = μ m g r until v = ω r (Goldsmith, *Impact*; any text on mechanics). Friction is
-    constant until then: only the step in which sliding ends is not exact, in place by μ g dt², as a velocity is hit to
-    the tolerance of a contact problem. Angular momentum about the ground is (7/5) m v r throughout.
+    constant until then, so only the step in which sliding ends is not exact, in position by μ g dt². A velocity is
+    reached to the tolerance of a contact problem. The angular momentum about the ground is (7/5) m v r when it rolls.
     """
     v, mu, radius = 5.0, 0.2, 1.0
-    # The floor is one wall of six, the others too far to be met: the step of the sphere in a box (case 8).
+    # The floor is one of six walls, and the others are far away: so case 8, a sphere in a box, uses the same kernel.
     sphere = physics.Sphere(radius, 1.0, pos=(0, radius, 0), linvel=(v, 0, 0))
     scene = boxed(sphere, (1e3, 1e3, 1e3), 0.0, mu, (0, -GRAVITY, 0), origin=(0, 1e3, 0))
     world = on.world(scene)
@@ -50,13 +50,15 @@ def rolling(on: Setting) -> Sequence[Check]:
 
 
 def euler_disk(on: Setting) -> Sequence[Check]:
-    """A disk rolls on its rim about its centre, which stands still: Ω² sinα = 4 g/a; nothing makes it grow.
+    """A disk rolls on its rim while its centre stands still: Ω² sinα = 4 g/a, and no energy is gained.
 
-    Steady: with e up the disk's slope, ω = Ω sinα e, no spin about the axis; L = (m a²/4) ω turns at Ω, so that
-    Ω (m a²/4) Ω sinα cosα = m g a cosα (Moffatt, *Euler's disk and its finite-time singularity*, Nature 404, 2000). A
-    flat ellipsoid with a disk's inertia stands for it: its lowest point is that of the rim to (c/a)² cot²α/2, 1e-6.
-    Time stepping is of second order in Ω dt, per turn: the slope may change by (Ω dt)²/4 in each, and Ω with it; the
-    contact point stands still, so that nothing does work on the disk but by the square of that.
+    In the steady motion, ω = Ω sinα e, where e points up the disk's slope, without spin about the disk's axis. L = (m
+    a²/4) ω turns at Ω, so that Ω (m a²/4) Ω sinα cosα = m g a cosα (Moffatt, *Euler's disk and its finite-time
+    singularity*, Nature 404, 2000). A flat ellipsoid with a disk's inertia replaces the disk. Its lowest point is that
+    of the rim to (c/a)² cot²α/2, 1e-6.
+
+    Limits: time stepping is of second order in Ω dt per turn. The slope may change by (Ω dt)²/4 in each turn, and Ω
+    with it. The contact point stands still, so work on the disk is of the order of the square of that.
     """
     a, flat, mass, alpha = 1.0, 1e-3, 1.0, math.radians(40.0)
     omega = math.sqrt(4 * GRAVITY / (a * math.sin(alpha)))
@@ -87,21 +89,27 @@ def euler_disk(on: Setting) -> Sequence[Check]:
 
 
 class Ellipse(NamedTuple):
-    """Upright section of an ellipsoid that turns by θ about its axis z: height H(θ) of its centre on a floor [m]."""
+    """Upright section of an ellipsoid that is turned by θ about its axis z, with half-axes a and b [m].
+
+    `height` is H(θ), the height of its centre above a floor that it touches.
+    """
 
     a: float
-    b: float  # half-axis that is upright at θ = 0
+    b: float  # half-axis that is vertical at θ = 0
 
     def height(self, angle):
-        """H = √(a² sin²θ + b² cos²θ)."""
+        """Height of the centre, H = √(a² sin²θ + b² cos²θ) [m]."""
         return math.hypot(self.a * math.sin(angle), self.b * math.cos(angle))
 
     def slope(self, angle):
-        """H' = (a² - b²) sinθ cosθ/H."""
+        """Derivative of the height, H' = (a² - b²) sinθ cosθ/H [m/rad]."""
         return (self.a**2 - self.b**2) * math.sin(angle) * math.cos(angle) / self.height(angle)
 
     def body(self, angle: float = 0.0, lift: float = 0.0, spin: float = 0.0) -> physics.Ellipsoid:
-        """1 kg, `lift` above the floor, turned by `angle` about z; at `spin` it rolls, with its lowest point still."""
+        """Ellipsoid of 1 kg, turned by `angle` about z [rad], with its lowest point `lift` above the floor [m].
+
+        `spin` is its angular velocity about z [rad/s], at which it rolls: its lowest point is at rest.
+        """
         height = self.height(angle)
         return physics.Ellipsoid(
             (self.a, self.b, 0.4), 1.0, pos=(0, height + lift, 0), quat=turned(angle),
@@ -110,22 +118,27 @@ class Ellipse(NamedTuple):
 
 
 def rolls_without_impact(on: Setting) -> Sequence[Check]:
-    """An ellipsoid rolls, rocks and lands: impacts are where it meets the floor, and nowhere else.
+    """An ellipsoid rolls, rocks and lands: it has an impact where it meets the floor, and no other.
 
-    Half-axes 0.5 and 0.3 m across the axis it turns about, I = m (a² + b²)/5, centre at H(θ) above the floor, θ from
-    lying flat. The floor's push is N = m (g + d²H/dt²) = m (g + H'θ̈ + H''θ̇²). On a smooth floor the energy
-    ½ (I + m H'²) θ̇² + m g H is kept, so that θ̈ = -(m H'H''θ̇² + m g H')/(I + m H'²) and
+    It has half-axes a = 0.5 m and b = 0.3 m across its axis of rotation, and I = m (a² + b²)/5. Its centre is at the
+    height H(θ), with θ = 0 when it lies flat. The floor pushes with N = m (g + d²H/dt²) = m (g + H'θ̈ + H''θ̇²). On a
+    smooth floor the energy ½ (I + m H'²) θ̇² + m g H is kept, so θ̈ = -(m H'H''θ̇² + m g H')/(I + m H'²) and
 
         N = m I (g + H''θ̇²)/(I + m H'²).
 
-    Let go at θ = 0.5 it rocks with N >= 0.65 m g. Dropped there from 0.05 m, e = 0, it lands after √(2h/g), by one
-    impact, with θ̇ = -H' v/(I/m + H'²), and rocks with N >= 0.63 m g. On a rough floor it rolls, r² = H² + H'² from its
-    centre to the contact, (I + m r²) θ̈ = -m H'((H + H'')θ̇² + g): over and over, upright at 1 rad/s, N >= 0.76 m g, with
-    friction of 0.29 N at most. Contact never breaks, so nothing hits. Bouncing flat from 1 m at e = 1/2 it hits at
-    √(2h/g) (1, 2, 5/2, ...) = √(2h/g) (3 - 2/2^k), each by
-    m (1 + e) times its speed. (`tests/physics/test_rolling_ellipsoid.py` computes these N.)
+    Four runs:
 
-    An impact is made within half a slop of the floor; gravity grows the error of one bounce by 1/e into the next.
+    - Released at rest at θ = 0.5, it rocks with N >= 0.65 m g.
+    - Dropped at this angle from 0.05 m with e = 0, it lands after √(2h/g) with one impact. Then θ̇ = -H' v/(I/m + H'²),
+      and it rocks with N >= 0.63 m g.
+    - On a rough floor it rolls over and over, upright at 1 rad/s: with r² = H² + H'² from its centre to the contact,
+      (I + m r²) θ̈ = -m H'((H + H'')θ̇² + g), N >= 0.76 m g and friction is at most 0.29 N.
+    - Bouncing flat from 1 m with e = 1/2 it hits at √(2h/g) (1, 2, 5/2, ...) = √(2h/g) (3 - 2/2^k), each time with the
+      impulse m (1 + e) times its speed.
+
+    As long as N > 0, contact never breaks, so there is no impact. `tests/physics/test_rolling_ellipsoid.py` computes
+    these N. Limit: an impact is made within half a slop of the floor, and the error of one bounce grows by 1/e to the
+    next.
     """
     ellipse, seconds = Ellipse(0.5, 0.3), on.pick(4.0, 2.0)
     if not on.is_ours:
@@ -154,7 +167,7 @@ def rolls_without_impact(on: Setting) -> Sequence[Check]:
 
 
 def _impacts(on: Setting, scene: physics.Scene, seconds: float) -> list[tuple[float, float]]:
-    """(time [s], impulse [N s]) of each impact of the body."""
+    """Time [s] and impulse [N s] of each impact of the body in a scene, within `seconds`."""
     world, found = on.world(scene), []
     world.make_event_room(64)
     for k in range(on.steps(seconds)):

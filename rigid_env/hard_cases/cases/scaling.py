@@ -1,7 +1,7 @@
-"""Hard cases of symmetry and size: overlap, scale, far away, turned, mirrored, backwards, tiny and huge.
+"""Hard cases of symmetry and size: overlap, scaling, distance, rotation, mirroring, time reversal, extreme sizes.
 
-Two runs that should be the same are compared. What rounding (or a tolerance) may make of them is not guessed: a third
-run starts a little off, and says by how much the scene multiplies what is off, its `growth`.
+Two runs that should agree are compared. The difference that rounding or a tolerance may cause is measured: a third run
+starts with a small displacement, and shows the factor by which the scene amplifies it, its `growth`.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from rigid_env.hard_cases.cases.scenery import (
     on_floor,
 )
 
-RADIUS = 0.5 * float(np.linalg.norm(SIZE))  # of the block's bounding sphere [m]
+RADIUS = 0.5 * float(np.linalg.norm(SIZE))  # radius of the block's bounding sphere [m]
 TILT = (math.cos(0.2), math.sin(0.2), 0.0, 0.0)
-NUDGE = 2.0**-30  # of a start, to see what a scene makes of it [m]
+NUDGE = 2.0**-30  # small displacement of a start, to measure how a scene amplifies it [m, m/s]
 
 
 def overlap(on: Setting) -> Sequence[Check]:
-    """Two cubes overlap by a quarter of their edge: they come apart, and nothing is launched.
+    """Two cubes overlap by a quarter of their edge: they separate without a launch speed.
 
-    What overlaps is pushed apart without a velocity: in free space they stay as slow as they were, 0, until they only
-    touch. On a floor the upper one then lies on the lower one. The speed that may be seen is that of falling back from
-    where it was put, a slop, and of one step's free fall.
+    Overlapping bodies are pushed apart without a velocity. In free space they keep the speed 0 until they only touch.
+    Here the lower cube lies on a floor, and the upper one ends on it. Limit for the speed: that of falling back by a
+    slop, and of one step's free fall.
     """
     edge = 1.0
     pair = [physics.Block((edge,) * 3, 1.0, pos=(0, 0.5, 0)), physics.Block((edge,) * 3, 1.0, pos=(0, 1.25, 0))]
@@ -61,7 +61,11 @@ def overlap(on: Setting) -> Sequence[Check]:
 
 def _throw(scale: float = 1.0, time: float = 1.0, heavy: float = 1.0, offset=(0.0, 0.0, 0.0), boost=(0.0, 0.0, 0.0),
            friction: float = 0.5) -> physics.Scene:  # fmt: skip
-    """Throw the block tilted onto a floor; `scale`, `time` and `heavy` multiply lengths, times and masses."""
+    """Scene with the block thrown tilted onto a floor.
+
+    `scale`, `time` and `heavy` multiply lengths, times and masses. `offset` [m] and `boost` [m/s] are added to the
+    start's position and velocity before scaling of the velocity; the floor moves with the offset.
+    """
     offset = np.asarray(offset)
     body = physics.Block(
         np.array(SIZE) * scale, MASS * heavy, pos=np.array([0.1, 2.6, 0.2]) * scale + offset, quat=TILT,
@@ -72,7 +76,10 @@ def _throw(scale: float = 1.0, time: float = 1.0, heavy: float = 1.0, offset=(0.
 
 
 def _path(on: Setting, scene: physics.Scene, seconds: float = 2.0, time: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """(samples, 3) places [m] and (samples, 3, 3) attitudes of the first body, every tenth of `seconds`."""
+    """Positions (10, 3) [m] and rotation matrices (10, 3, 3) of the first body, at ten times within `seconds`.
+
+    `time` multiplies the step of the setting.
+    """
     world = replace(on, dt=on.dt * time).world(scene)
     places, attitudes = [], []
     for _ in range(10):
@@ -83,22 +90,25 @@ def _path(on: Setting, scene: physics.Scene, seconds: float = 2.0, time: float =
 
 
 def _apart(one, other) -> float:
-    """Largest difference of places, and of attitudes times the block's radius [m]."""
+    """Largest difference of two paths from `_path`: of positions, and of rotations times the block's radius [m]."""
     return max(float(np.abs(one[0] - other[0]).max()), RADIUS * float(np.abs(one[1] - other[1]).max()))
 
 
 def _growth(on: Setting, make: Callable[..., physics.Scene], path) -> float:
-    """Factor, at least 1, by which the scene magnifies a nudge of its start: the largest of three directions."""
+    """Factor, at least 1, by which the scene amplifies a small change of its start: the largest for three directions.
+
+    `make` makes the scene with an offset and a boost, and `path` is its undisturbed path.
+    """
     nudges = np.eye(3) * NUDGE
     return max(1.0, *(_apart(_path(on, make(offset=tuple(nudge * (1, 0, 1)), boost=tuple(nudge))), path) / NUDGE
                       for nudge in nudges))  # fmt: skip
 
 
 def powers_of_two(on: Setting) -> Sequence[Check]:
-    """Lengths by λ², times by λ, λ = 4 and 2^±10, masses by 4: the same bits, scaled.
+    """Lengths times λ², times times λ, masses times 4, λ = 4 and 2^±10: the same bits, apart from exponents.
 
-    Powers of two are multiplied without rounding, so that every number of the run is the same but for its exponent
-    (gravity has λ² / λ² = 1). Any hidden length, time, mass or tolerance would show.
+    Multiplication by a power of two is exact, so every number of the run differs only by its exponent; gravity is
+    multiplied by λ² / λ² = 1. A hidden length, time, mass or tolerance would show.
     """
     path = _path(on, _throw())
     checks = []
@@ -110,17 +120,20 @@ def powers_of_two(on: Setting) -> Sequence[Check]:
 
 
 def far_away(on: Setting) -> Sequence[Check]:
-    """The scene 1e6 m (2^20) away, and one in a frame moving at 100 m/s (without friction): the same to rounding.
+    """A scene 1e6 m (2^20 m) from the origin, and one in a frame that moves at 100 m/s: the same motion, to rounding.
 
-    Places 2^20 m away are rounded to 1.2e-10 m, a few times a step, and multiplied by what the scene makes of it; where
-    contact problems are solved to a tolerance they may come out another way: by that of the body's radius. In the
-    moving frame each step adds the same way h v to the place. While the place keeps its power of two, these sums are
-    rounded to the same side: by up to half a last digit of the 256 m at the end in each step.
+    Limit at a distance: positions 2^20 m away are rounded to 1.2e-10 m a few times in each step, times the growth.
+    Contact problems that are solved to a tolerance may have other solutions, which differ by the tolerance times the
+    body's radius.
+
+    Limit in the moving frame, without friction: each step adds the same h v to the position. While the position stays
+    between two powers of two, all these sums are rounded in the same direction, by up to half the last binary digit of
+    the final 256 m in each step.
     """
     far, fast = 2.0**20, 128.0
     path = _path(on, _throw())
     growth = _growth(on, _throw, path)
-    steps = max(2.0 / on.dt, 1000.0)  # between events the event-driven scheme makes its own
+    steps = max(2.0 / on.dt, 1000.0)  # the event-driven scheme chooses its own steps between events
     moved = _path(on, _throw(offset=(far, far, far)))
     off = _apart((moved[0] - far, moved[1]), path)
     still = _path(on, _throw(friction=0.0))
@@ -136,9 +149,10 @@ def far_away(on: Setting) -> Sequence[Check]:
 
 
 def _turned_scene(Q: np.ndarray, first: int = 0, between: bool = False) -> physics.Scene:
-    """The thrown block and everything about it turned (or mirrored) by the orthogonal matrix Q (3, 3).
+    """Scene of the thrown block and a second one, rotated or mirrored as a whole by the orthogonal matrix Q (3, 3).
 
     A mirror image of a block is a block: its attitude R becomes Q R S with a reflection S of one of its own axes.
+    `first` (0 or 1) is the block that comes first.
     """
     body, handed = _throw().bodies[0], np.linalg.det(Q)
     R = Q @ rotation_matrices(np.array(body.quat)) @ np.diag([1.0, 1.0, handed])
@@ -156,10 +170,11 @@ def _turned_scene(Q: np.ndarray, first: int = 0, between: bool = False) -> physi
 
 
 def symmetry(on: Setting) -> Sequence[Check]:
-    """Turned by 90° about each axis, mirrored in each plane: the same motion; two bodies swapped: the same bits.
+    """A scene rotated by 90° or mirrored has the same motion; with two bodies swapped, the same bits.
 
-    Attitudes of 90° are not exact in binary, and sums run in another order: rounding at the start and in every step,
-    and where contact problems are solved to a tolerance that of the body's radius, multiplied by the scene's growth.
+    Limit: attitudes of 90° are not exact in binary, and sums are added in another order. This rounds at the start and
+    in every step. Contact problems are solved to a tolerance, which adds an error of the tolerance times the body's
+    radius. Both errors are multiplied by the scene's growth of small differences.
     """
     path = _path(on, _turned_scene(np.eye(3)))
     growth = _growth(on, _throw, _path(on, _throw()))
@@ -186,10 +201,10 @@ def symmetry(on: Setting) -> Sequence[Check]:
 
 
 def backwards(on: Setting) -> Sequence[Check]:
-    """e = 1, μ = 0: with all velocities turned round everything goes back to the start.
+    """With e = 1 and μ = 0, everything returns to the start after all velocities are reversed.
 
-    The sphere in a box after 1000 hits, to rounding (case 8); the block tumbling there after 2 s and a few hits: a hit
-    is made half a slop off its place at most, and what the scene makes of that is the growth of a nudge.
+    The sphere in a box returns after 1000 hits, to rounding (case 8). The block tumbling in the box returns after 2 s
+    and a few hits: a hit is at most half a slop off its position, and this is amplified by the growth of a nudge.
     """
     half, checks = 5.0, []
     start, velocity, hits = np.array([0.3, -1.1, 2.0]), np.array([3.0, 4.0, 5.0]), on.pick(1000, 200)
@@ -218,7 +233,7 @@ def backwards(on: Setting) -> Sequence[Check]:
 
 
 def _there_and_back(world, steps: int) -> np.ndarray:
-    """Place (3,) after `steps` forwards, a reversal of all velocities, and `steps` again."""
+    """Position (3,) of the first body after `steps` steps, a reversal of all velocities, and `steps` more [m]."""
     world.step(steps=steps)
     world.set_state(linvel=-np.array(world.linvel), angvel=-np.array(world.angvel))
     world.step(steps=steps)
@@ -245,10 +260,10 @@ BAD = {
 
 
 def extremes(on: Setting) -> Sequence[Check]:
-    """Masses and sizes of 1e-6 and 1e6 give the scaled trajectory; a ratio of moments of 1e4 turns without gain.
+    """Masses and sizes times 1e-6 and 1e6 give the scaled motion; a ratio of moments of 1e4 gains no energy.
 
-    As case 39, but 1e±6 are no powers of two: numbers are rounded in every step, and contact problems solved to the
-    tolerance. What makes no sense is a ValueError that says so.
+    As in case 39, but 1e±6 are no powers of two: numbers are rounded in every step, and contact problems are solved to
+    the tolerance. Bodies with impossible numbers (`BAD`) must raise a ValueError that says what is allowed.
     """
     path = _path(on, _throw())
     growth = _growth(on, _throw, path)

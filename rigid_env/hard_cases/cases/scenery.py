@@ -1,7 +1,7 @@
-"""Scenes and measures that the hard cases share.
+"""Scenes and measured quantities that several hard cases share.
 
-Effects are declared even where a coefficient is 0: a scene with e = 0 and μ = 0 then has the same compiled step as
-one with any other, and all cases of one body need a handful of steps.
+All scenes declare contact, friction and gravity even with coefficients of 0. Then they have the same compiled step as
+scenes with other coefficients, and all cases with one body need only a handful of compiled steps.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ WIDE = 1e3  # half width of a box whose other walls are never met [m]
 
 
 def block(pos=(0.0, SIZE[1] / 2, 0.0), size=SIZE, mass=MASS, **start) -> physics.Block:
-    """The block 5 x 3 x 2 m of 6 kg, by default face down on the floor."""
+    """Block of 5 x 3 x 2 m and 6 kg, by default face down on the floor; `start` goes to `physics.Block`."""
     return physics.Block(size, mass, pos=pos, **start)
 
 
 def free(body: physics.Body, gravity=(0.0, 0.0, 0.0)) -> physics.Scene:
-    """The body in empty space."""
+    """Scene with a body in empty space."""
     return physics.Scene([body], [], [physics.Gravity(gravity)])
 
 
 def laws(restitution: float = 0.0, friction: float = 0.0, gravity=(0.0, -GRAVITY, 0.0)) -> list:
-    """Gravity, contact and friction."""
+    """Effects of a scene: gravity, contact and friction."""
     return [physics.Gravity(gravity), physics.Contact(restitution), physics.Friction(friction)]
 
 
 def on_floor(body: physics.Body, restitution=0.0, friction=0.0, gravity=(0.0, -GRAVITY, 0.0)) -> physics.Scene:
-    """The body and a floor y = 0."""
+    """Scene with a body and a floor y = 0."""
     return physics.Scene([body], [FLOOR], laws(restitution, friction, gravity))
 
 
@@ -46,7 +46,7 @@ def boxed(
     body: physics.Body, halves: Sequence[float] = (WIDE, WIDE, WIDE), restitution=0.0, friction=0.0,
     gravity=(0.0, 0.0, 0.0), origin=(0.0, 0.0, 0.0),
 ) -> physics.Scene:  # fmt: skip
-    """The body between six walls at `origin` ± `halves` [m]."""
+    """Scene with a body between six walls at `origin` ± `halves` [m]."""
     walls = []
     for axis in range(3):
         for sign in (1.0, -1.0):
@@ -56,7 +56,7 @@ def boxed(
 
 
 def turned(angle: float, axis=(0.0, 0.0, 1.0)) -> tuple[float, float, float, float]:
-    """Quaternion of the turn by `angle` [rad] about `axis`, of any length."""
+    """Quaternion (4,), w first, of a rotation by `angle` [rad] about `axis`, a vector of any length."""
     x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis) * math.sin(0.5 * angle)
     return math.cos(0.5 * angle), float(x), float(y), float(z)
 
@@ -68,13 +68,13 @@ def energy(world, scene: physics.Scene) -> float:
 
 
 def kinetic_energy(world, scene: physics.Scene) -> float:
-    """Kinetic energy of all bodies [J]."""
+    """Kinetic energy of all bodies [J], from the state alone, for any engine."""
     weightless = physics.Scene(scene.bodies)
     return energy(world, weightless)
 
 
 def attitude(world) -> np.ndarray:
-    """(3, 3) rotation, body to world, of the first body of the first world."""
+    """Rotation matrix (3, 3), body to world, of the first body of the first world."""
     return rotation_matrices(np.asarray(world.quat)[0, 0])
 
 
@@ -95,34 +95,34 @@ def is_finite(world) -> bool:
 
 
 def none_of_finite(what: str, world) -> Check:
-    """Check that every number of the state is finite."""
+    """Check that every number of the state of a world is finite."""
     return none_of(what, not is_finite(world))
 
 
 def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), bodies: int = 1) -> np.ndarray:
-    """(1, bodies, 6): a force [N] and a torque [N m] on the first body."""
+    """Wrench array (1, bodies, 6) with a force [N] and a torque [N m] on the first body."""
     load = np.zeros((1, bodies, 6))
     load[0, 0, :3], load[0, 0, 3:] = force, torque
     return load
 
 
 def of_last_step(on: Setting, mu: float) -> float:
-    """Bound of the error in place of a step in which sliding ends [m]: the speed left, μ g dt at most, times dt."""
+    """Limit for the position error of the step in which sliding ends [m]: a speed of at most μ g dt, times dt."""
     return 0.0 if on.is_event_driven else mu * GRAVITY * on.dt**2
 
 
 def early(on: Setting, body: physics.Body) -> float:
-    """Bound of the displacement [m] that one hit adds to the path of a body that flies between walls.
+    """Largest displacement that one hit adds to the path of a body that flies between walls [m].
 
-    Time stepping finds the time of a hit at constant speed by one division: 0. The event-driven scheme takes contacts
-    that would touch within 1e-10 and ten tolerances of the time R/v as one impact (theory, section 8): one of them is
-    turned round that much early, 2 v of it.
+    Time stepping computes the time of a hit at constant speed by one division, so this is 0. The event-driven scheme
+    treats contacts that would touch within 1e-10 and ten tolerances of the time R/v as one impact (theory, section 8).
+    One of them is reversed too early by this time, at a change of velocity of 2 v.
     """
     radius = float(body.bounding_radius(body.dimensions))
     return 2 * (1e-10 + 10 * on.tolerance) * radius if on.is_event_driven else 0.0
 
 
 def state_of(world) -> np.ndarray:
-    """(bodies * 13,) copy of the first world's state."""
+    """Copy of the first world's state as one array (bodies * 13,)."""
     parts = (world.pos, world.quat, world.linvel, world.angvel)
     return np.concatenate([np.asarray(part)[0].ravel() for part in parts])

@@ -1,4 +1,4 @@
-"""Common parts of the piles: their scene, the displacement of bodies, and the load of each."""
+"""Shared parts of the hard cases of piles: scenes, displacements of bodies, and the load on each body."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ G = 9.81  # [m/s²]
 CUBE = (1.0, 1.0, 1.0)  # [m]
 FLOOR = physics.HalfSpace((0, 1, 0))
 
-# Share of a body's edge that it may move and still stand, of any engine; ours is held against its slop besides.
+# Displacement at which a body still stands, as a share of its edge, for other engines; ours has a limit by its slop.
 STANDING = 0.01
 
 
 def pile(bodies: Sequence[physics.Body], friction: float = 0.5) -> physics.Scene:
-    """Bodies on a floor, plastic and rough."""
+    """Scene of bodies on a floor y = 0, without restitution."""
     return physics.Scene(bodies, [FLOOR], [physics.Gravity((0, -G, 0)), physics.Contact(), physics.Friction(friction)])
 
 
 def tower(masses: Sequence[float], shifts: np.ndarray | None = None) -> physics.Scene:
-    """Unit cubes of these masses [kg] on each other, each shifted by a row of `shifts` (n, 2) along x and z [m]."""
+    """Scene of stacked unit cubes with these masses [kg]; `shifts` (n, 2) displace them along x and z [m]."""
     shifts = np.zeros((len(masses), 2)) if shifts is None else shifts
     return pile(
         [physics.Block(CUBE, m, pos=(x, k + 0.5, z)) for k, (m, (x, z)) in enumerate(zip(masses, shifts.tolist()))]
@@ -32,12 +32,12 @@ def tower(masses: Sequence[float], shifts: np.ndarray | None = None) -> physics.
 
 
 def farthest(world, start: np.ndarray) -> float:
-    """Largest displacement of any body along any axis [m]."""
+    """Largest displacement of any body from its position in `start`, along any axis [m]."""
     return float(np.abs(world.pos - start).max())
 
 
 def loads(world: physics.World) -> np.ndarray:
-    """Vertical force (bodies,) from below on every body [N]; all contacts must be with neighbours above and below."""
+    """Vertical force (bodies,) from below on every body [N]; all contacts must be with neighbours above or below."""
     found = np.zeros(world.body_count)
     for (a, b), force in zip(world.contact_ends().tolist(), world.contacts()[1]):
         lower_is_second = b < 0 or world.pos[0, b, 1] < world.pos[0, a, 1]
@@ -46,23 +46,23 @@ def loads(world: physics.World) -> np.ndarray:
 
 
 def settle(setting: Setting, world, duration: float, enough: float = math.inf) -> tuple[float, int, float]:
-    """Let a pile stand.
+    """Simulate a pile, and measure how far its bodies move.
 
     Parameters
     ----------
     setting : Setting
     world : World
-        Or what looks like one.
+        World of our engine, or of another one (`Setting.maker`).
     duration : float
         [s].
     enough : float
-        Displacement that ends it [m]: of what falls, to show that it does.
+        Displacement that ends the run [m], to show that a pile falls.
 
     Returns
     -------
     moved, wrong, depth : float, int, float
-        Largest displacement at any second [m], seconds with a report that is not OK, worst penetration [m]; the last
-        two are 0 of another engine.
+        Largest displacement at any full second [m], number of seconds with a report that is not OK, and largest
+        penetration [m]. The last two are 0 for other engines.
     """
     start = world.pos.copy()
     moved, wrong, depth = 0.0, 0, 0.0
@@ -79,10 +79,22 @@ def settle(setting: Setting, world, duration: float, enough: float = math.inf) -
 
 
 def standing(setting: Setting, what: str, moved: float, wrong: int, layers: int, edge: float = 1.0) -> list[Check]:
-    """Checks that a pile of so many layers of bodies with this least edge [m] stands.
+    """Checks that a pile stands.
 
-    Each interface may close or open by one slop, the gap that counts as none, of a cube's bounding radius; so the top
-    of n layers by n slops.
+    Each contact between two layers may open or close by one slop, the gap that counts as touching, times a cube's
+    bounding radius. So the top of n layers may move by n slops.
+
+    Parameters
+    ----------
+    setting : Setting
+    what : str
+        Name of the pile.
+    moved, wrong : float, int
+        Results of `settle`.
+    layers : int
+        Layers of bodies in the pile.
+    edge : float
+        Least edge of a body, for the limit of other engines [m].
     """
     if not setting.is_ours:
         return [Check(f"{what}: moved", moved, STANDING * edge, "m")]
@@ -94,5 +106,5 @@ def standing(setting: Setting, what: str, moved: float, wrong: int, layers: int,
 
 
 def load_error(world: physics.World, expected: np.ndarray) -> float:
-    """Largest error of the load of a body, as a share of the whole weight."""
+    """Largest error of the load on a body, as a share of the largest expected load, which is the whole weight."""
     return float(np.abs(loads(world) - expected).max() / expected.max())

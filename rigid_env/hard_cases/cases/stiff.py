@@ -1,4 +1,4 @@
-"""Hard cases of effects that a step is too long for: drag that stops a body within a step, a spring like a rod."""
+"""Hard cases of effects that are too fast for a step: drag that stops a body within it, a spring stiff as a rod."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
 
 
 def balloon(on: Setting) -> Sequence[Check]:
-    """A balloon of 3 g and radius 0.14 m, thrown at 40 m/s: x = ln(1 + k v₀ t)/k, v = v₀/(1 + k v₀ t), k = ½ρCπr²/m.
+    """A balloon of 3 g and radius 0.14 m is thrown at 40 m/s: x = ln(1 + k v₀ t)/k, v = v₀/(1 + k v₀ t), k = ½ρCπr²/m.
 
-    m v' = -½ρCπr² v² (Rayleigh). h λ = 2 h k v₀ is 4.7 at 10 ms: the explicit midpoint rule turns the velocity round
-    and multiplies it. A step is cut into parts that begin at h λ = ¼ and grow by half, each with v' = v/(1 + h k v),
-    exact, and x = h (v + v')/2, which errs by (h k v)²/12: 1/768 of the first part's way, more of later ones, 5 % of
-    them all at most.
+    This solves m v' = -½ρCπr² v² (Rayleigh). With h λ = 2 h k v₀ = 4.7 at a step of 10 ms, the explicit midpoint rule
+    would reverse and amplify the velocity. So the engine divides a step into parts that begin at h λ = ¼ and grow by
+    half. Each part has v' = v/(1 + h k v), which is exact, and x = h (v + v')/2 with a relative error of (h k v)²/12.
+    Limit: this is 1/768 of the first part's path, more for later parts, and at most 5 % for all of them.
     """
     radius, mass, v = 0.14, 0.003, 40.0
     drag = physics.Drag()
@@ -40,12 +40,12 @@ def balloon(on: Setting) -> Sequence[Check]:
 
 
 def rod_like_spring(on: Setting) -> Sequence[Check]:
-    """A pendulum on a spring of Ω = 3000 rad/s, from 0.1 rad: it swings as on a rod, and no energy comes of it.
+    """A pendulum on a spring of Ω = 3000 rad/s, released at 0.1 rad, swings like one on a rod, and gains no energy.
 
-    The period of a pendulum is 2π √(l/g) (1 + θ₀²/16 + ...). No step of time stepping here resolves the spring, which a
-    report must say. With the mean of the lengths before and after a step in its force (Gonzalez's discrete gradient)
-    the spring keeps the energy, and the midpoint rule swings with tan(hω'/2) = hω/2: a share (hω)²/12 too slowly.
-    Half a step of either crossing may be lost where the length rings.
+    The period of a pendulum is 2π √(l/g) (1 + θ₀²/16 + ...). No step of time stepping resolves this spring, and the
+    report must say so. The force uses the mean of the lengths before and after a step (Gonzalez's discrete gradient),
+    so that the spring keeps the energy. Limit: the midpoint rule swings with tan(hω'/2) = hω/2, too slowly by the share
+    (hω)²/12. Half a step may be lost at the first and at the last crossing, since the spring's length oscillates.
     """
     length, mass, theta = 1.0, 1.0, 0.1
     rate = math.sqrt(GRAVITY / length)

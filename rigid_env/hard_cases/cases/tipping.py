@@ -1,4 +1,4 @@
-"""Hard cases of tipping: inclines, pushes, balance on an edge and on a vertex, rocking."""
+"""Hard cases of tipping: on an incline, by a push, balance on an edge and on a vertex, rocking."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from rigid_env.hard_cases.cases.scenery import (
     wrench,
 )
 
-ROUGH = 2.0  # friction at which nothing here slides, where tipping is meant
-TRUTH = 1e-11  # relative tolerance of the equations of motion by DOP853
+ROUGH = 2.0  # friction coefficient for cases in which a body must tip without sliding
+TRUTH = 1e-11  # relative tolerance of DOP853 for the equations of motion
 
 
 def pendulum(angle: float, rate: float, duration: float) -> float:
-    """Angle φ(duration) from the vertical of a body that tips: φ̈ = rate² sinφ from rest at `angle` [rad]."""
+    """Angle from the vertical after `duration` [s] of a body that tips from rest at `angle`: φ̈ = rate² sinφ."""
     run = solve_ivp(
         lambda t, y: (y[1], rate * rate * math.sin(y[0])), (0.0, duration), (angle, 0.0), "DOP853", rtol=TRUTH,
         atol=1e-3 * TRUTH * abs(angle),
@@ -38,12 +38,12 @@ def pendulum(angle: float, rate: float, duration: float) -> float:
 
 
 def _slack(on: Setting, rate: float, duration: float) -> float:
-    """Allowed relative error, after `duration`, of an angle that grows at `rate`.
+    """Allowed relative error, after `duration` [s], of an angle that grows at `rate` [1/s].
 
-    The midpoint step makes e^(λh) into (1 + λh/2)/(1 - λh/2) or, with positions drifting on either side of it,
-    exp(2 asinh(λh/2)): rates λ (1 + (λh)²/12) and λ (1 - (λh)²/24). What grows for λT is then off by (λh)² λT/12 at
-    most, and by (λh)²/2 for the first step, in which nothing turns but the velocity. Event-driven: a hundred steps of
-    the tolerance each.
+    The midpoint step replaces e^(λh) by (1 + λh/2)/(1 - λh/2) or, with positions drifting on either side of it, by
+    exp(2 asinh(λh/2)). This corresponds to the rates λ (1 + (λh)²/12) and λ (1 - (λh)²/24). After the time T an angle
+    is off by at most (λh)² λT/12, and by (λh)²/2 for the first step, in which only the velocity changes. For the
+    event-driven scheme the limit is a hundred steps of the tolerance each.
     """
     if on.is_event_driven:
         return 100 * on.tolerance
@@ -52,10 +52,11 @@ def _slack(on: Setting, rate: float, duration: float) -> float:
 
 
 def tips_on_incline(on: Setting) -> Sequence[Check]:
-    """Upright on an incline, high friction: tips over its lower edge iff tanθ > b/h, tried 1 % below and above.
+    """The block stands upright on a rough incline: it tips over its lower edge iff tanθ > b/h.
 
-    Above it turns about the edge, at R = √(b² + h²), as a pendulum upside down, φ̈ = λ² sinφ, λ² = m g R/I, from where
-    its weight's line is, θ - atan(b/h) beyond the edge.
+    The case runs 1 % below and above. Above the limit the block rotates about the edge like an inverted pendulum of the
+    length R = √(b² + h²): φ̈ = λ² sinφ, λ² = m g R/I. It starts where the line of its weight passes the edge by θ -
+    atan(b/h).
     """
     b, h, time = SIZE[1] / 2, SIZE[0] / 2, 1.5
     upright, reach = turned(math.pi / 2), math.hypot(b, h)
@@ -78,11 +79,12 @@ def tips_on_incline(on: Setting) -> Sequence[Check]:
 
 
 def tips_when_pushed(on: Setting) -> Sequence[Check]:
-    """Pushed at height z it tips before sliding iff μ > b/z; the push is 1 % above what starts the first of the two.
+    """The block is pushed at height z: it tips before sliding iff μ > b/z.
 
-    Sliding starts at F = μ m g, tipping about the far edge at F z = m g b. Sliding it goes at a = F/m - μ g. Tipping by
-    α about the edge, F acting at the centre with the moment F (z - h) besides, I_e α̈ = F y + F (z - h) - m g x with the
-    centre at (x, y) = (b cosα - h sinα, h cosα + b sinα) from the edge.
+    The push is 1 % above the smaller of two limits: sliding starts at F = μ m g, tipping about the far edge at F z = m
+    g b. A sliding block has a = F/m - μ g. A block
+    that has tipped by α about the edge has I_e α̈ = F y + F (z - h) - m g x. Here F acts at the centre with the
+    additional moment F (z - h), and the centre is at (x, y) = (b cosα - h sinα, h cosα + b sinα) from the edge.
     """
     half_width, h, time = SIZE[0] / 2, SIZE[1] / 2, 1.0
     z, weight = 2.9, MASS * GRAVITY
@@ -111,7 +113,7 @@ def tips_when_pushed(on: Setting) -> Sequence[Check]:
 
 
 def _pushed_over(force: float, z: float, duration: float) -> float:
-    """Tipping angle of the pushed block [rad]."""
+    """Tipping angle after `duration` [s] of the block pushed with `force` [N] at height z [m], integrated [rad]."""
     b, h = SIZE[0] / 2, SIZE[1] / 2
     inertia = block().inertia[2, 2] + MASS * (b * b + h * h)
 
@@ -124,10 +126,10 @@ def _pushed_over(force: float, z: float, duration: float) -> float:
 
 
 def on_edge(on: Setting) -> Sequence[Check]:
-    """A cube of edge a on its edge, θ₀ beside the balance: θ̈ = λ² sinθ, λ² = 3 g/(2√2 a); and it does not stay there.
+    """A cube of edge a stands on its edge, θ₀ from balance: θ̈ = λ² sinθ, λ² = 3 g/(2√2 a), and it always falls.
 
-    About the edge I = (2/3) m a², at R = a/√2. From 1e-4 and 1e-2 rad it grows by cosh(λT); from ten offsets up to 40
-    degrees it must lie on a face in the end: within the slop of it.
+    About the edge I = (2/3) m a², and the centre is at R = a/√2. From 1e-4 and 1e-2 rad the angle grows by cosh(λT).
+    From ten offsets up to 40 degrees the cube must lie on a face in the end, within the slop.
     """
     a, mass = 1.0, 1.0
     rate = math.sqrt(3 * GRAVITY / (2 * math.sqrt(2) * a))
@@ -157,11 +159,12 @@ def _cube_on_edge(offset: float, a: float, mass: float, **start) -> physics.Bloc
 
 
 def on_vertex(on: Setting) -> Sequence[Check]:
-    """A cube on a vertex, its diagonal upright: dropped so it does not turn, balanced it stays, nudged it falls.
+    """A cube stands on a vertex: dropped on it it gets no spin, balanced it stays, nudged it falls.
 
-    The normal force passes through the centre: no moment but of rounding, ε a, which grows as cosh(λT) once it stands.
-    About the vertex I = (11/12) m a² across the diagonal, at R = (√3/2) a: λ² = m g R/I. Nudged by 1e-3 rad about a
-    horizontal axis the angle grows by cosh(λT), as long as it is small; then it lies on a face.
+    The normal force passes through the centre. So there is no moment but that of rounding, ε a, which grows by cosh(λT)
+    once the cube stands. About the vertex I = (11/12) m a² perpendicular to the diagonal, and the centre is at R =
+    (√3/2) a: λ² = m g R/I. Nudged by 1e-3 rad about a horizontal axis, the angle grows by cosh(λT) as long as it is
+    small; then the cube falls on a face.
     """
     a, mass, nudge = 1.0, 1.0, 1e-3
     reach = math.sqrt(3) / 2 * a
@@ -169,7 +172,7 @@ def on_vertex(on: Setting) -> Sequence[Check]:
     time = on.steps(1.5) * on.dt
     spin = 0.0
     dropped = on.world(on_floor(_cube_on_vertex(0.0, a, mass, 1.0), 0.5, ROUGH))
-    for _ in range(on.steps(1.2)):  # three or four bounces, in the air from 0.45 s on but for their moments
+    for _ in range(on.steps(1.2)):  # three or four bounces, the first after 0.45 s
         dropped.step()
         spin = max(spin, np.abs(dropped.angvel[0, 0]).max())
     still = on.world(on_floor(_cube_on_vertex(0.0, a, mass), 0.0, ROUGH))
@@ -192,7 +195,7 @@ def on_vertex(on: Setting) -> Sequence[Check]:
 
 
 def _upright() -> tuple:
-    """Attitude with the diagonal (1, 1, 1) of the body along world y."""
+    """Quaternion (4,), w first, of the attitude with the body's diagonal (1, 1, 1) along world y."""
     axis = np.cross((1, 1, 1), (0, 1, 0))
     return turned(math.acos(1 / math.sqrt(3)), axis)
 
@@ -207,13 +210,15 @@ def _cube_on_vertex(nudge: float, a: float, mass: float, height: float = 0.0) ->
 
 
 def housner(on: Setting) -> Sequence[Check]:
-    """A block let go on one of its edges, e = 0: it rocks; ω⁺/ω⁻ = 1 - (3/2) sin²α, T = (4/p) acosh(1/(1 - θ₀/α)).
+    """A block released on one of its edges rocks, e = 0: ω⁺/ω⁻ = 1 - (3/2) sin²α, T = (4/p) acosh(1/(1 - θ₀/α)).
 
-    Housner, *The behavior of inverted pendulum structures during earthquakes*, Bull. Seism. Soc. Am. 53, 1963. That T
-    is for small α: here θ̈ = -p² sin(α - θ), p² = 3 g/(4 R), is integrated; it rocks through θ = 0 after a quarter of
-    the first T, then half of the second, whose θ₁ has cos(α - θ₁) - cosα = (ω⁺/ω⁻)² (cos(α - θ₀) - cosα). The ratio
-    is that of angular momentum about the new edge, which the impact keeps. Energy above that of standing is seen for
-    ω², times from the parabola through the last angle, θ + ω τ - p² sin(α - θ) τ²/2, which leaves p² dt³/6.
+    Housner, *The behavior of inverted pendulum structures during earthquakes*, Bull. Seism. Soc. Am. 53, 1963. This T
+    is for small α; here θ̈ = -p² sin(α - θ) with p² = 3 g/(4 R) is integrated. The block passes θ = 0 after a quarter
+    of the first period, then after half of the second. The amplitude θ₁ of the second obeys cos(α - θ₁) - cosα =
+    (ω⁺/ω⁻)² (cos(α - θ₀) - cosα). The ratio follows from angular momentum about the new edge, which the impact keeps.
+
+    The ratio is measured by the energy above that of standing, which is proportional to ω². Times are measured by the
+    parabola through the last angle, θ + ω τ - p² sin(α - θ) τ²/2, with an error of p² dt³/6.
     """
     b, h = 0.25, 1.0
     alpha, reach = math.atan(b / h), math.hypot(b, h)
@@ -244,12 +249,12 @@ def housner(on: Setting) -> Sequence[Check]:
 
 
 def _to_zero(angle: float, rate: float, slowing: float) -> float:
-    """Time at which angle - rate τ - slowing τ²/2 is 0 [s]."""
+    """Time τ at which angle - rate τ - slowing τ²/2 is 0 [s]."""
     return 2 * angle / (rate + math.sqrt(rate * rate + 2 * slowing * angle))
 
 
 def _time_to_upright(angle: float, alpha: float, p2: float) -> float:
-    """A quarter of the period of a rocking block let go at `angle` [s]."""
+    """Quarter of the period of a rocking block released at `angle` [s]; `alpha` and `p2` are α and p² of `housner`."""
 
     def is_upright(t, y):
         return y[0]
@@ -263,7 +268,7 @@ def _time_to_upright(angle: float, alpha: float, p2: float) -> float:
 
 
 def _on_edge(theta: float, b: float, h: float) -> tuple[float, float, float]:
-    """Centre of a block turned by `theta` about its lower left edge, which is at (-b, 0)."""
+    """Centre (3,) of a block with half edges b and h [m], rotated by `theta` about its lower left edge at (-b, 0)."""
     c, s = math.cos(theta), math.sin(theta)
     return (-b + b * c - h * s, b * s + h * c, 0.0)
 

@@ -1,4 +1,4 @@
-"""Hard cases of bodies that turn by radians in a step: a rod past a ball, a cube and a hull, and beside a wall."""
+"""Hard cases of a body that rotates by radians in a step: a rod near a ball, a cube and a hull, and beside a wall."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases.scenery import FLOOR
 
 HALF, THIN = 1.0, 0.01  # half edges of the rod [m]
-REACH = math.hypot(HALF, THIN)  # of its corners from its axis of turning [m]
-TURNS = (0.3, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0)  # per step [rad]
-MARGIN = 2e-3  # by which things are within reach or out of it [m]
-CLEAR = 0.05  # angle between rod and thing at the start, at least [rad]
+REACH = math.hypot(HALF, THIN)  # distance of the rod's corners from its axis of rotation [m]
+TURNS = (0.3, 0.7, 1.0, 1.5, 2.0, 2.5, 3.0)  # angles of rotation per step [rad]
+MARGIN = 2e-3  # distance by which bodies are within the rod's reach or outside [m]
+CLEAR = 0.05  # least angle between the rod and the other body at the start [rad]
 
 
 def _rod(**start) -> physics.Block:
@@ -24,7 +24,7 @@ def _rod(**start) -> physics.Block:
 
 
 def _things() -> dict[str, tuple[physics.Body, float, float]]:
-    """Body, and radii [m] of balls about its centre: the largest inside it, the smallest around it."""
+    """Bodies that the rod meets, by name, with radii [m] of the largest ball inside and the smallest around each."""
     size = 0.1
     corners = tuple(tuple(float(s * size) for s in row) for row in (*np.eye(3), *-np.eye(3)))
     return {
@@ -35,22 +35,23 @@ def _things() -> dict[str, tuple[physics.Body, float, float]]:
 
 
 def _half_turn(on: Setting) -> int:
-    """Number of steps in which the slowest rod has turned by more than π."""
+    """Number of steps after which the slowest rod has rotated by more than π."""
     return math.ceil(math.pi / min(TURNS)) + 1
 
 
 def _spread(count: int, k: float) -> np.ndarray:
-    """Numbers evenly spread over 0 to 1, in another order for each k (multiples of an irrational number)."""
+    """`count` numbers evenly spread over 0 to 1, by multiples of √k; the order differs for each k."""
     return np.mod(np.arange(count) * math.sqrt(k) + 0.5, 1.0)
 
 
 def past_things(on: Setting) -> Sequence[Check]:
-    """A rod turns about its middle by 0.3 to 3 rad a step: in half a turn it sweeps a disc, and meets all in it.
+    """A rod rotates about its middle by 0.3 to 3 rad per step: it hits all bodies within its reach, and no other.
 
-    The disc has the radius 1 m of its ends' middles. A body whose centre is in the plane of the disc and which holds a
-    ball of radius r is met if its centre is nearer than 1 m + r to the rod's, and one that is held by a ball of radius
-    R is not if it is further than √(1 + b²) m + R, half the rod's width b included (by 2 mm each). Nothing else
-    acts, so that a body that was met has left its place, and another has not moved by one bit.
+    The middles of its ends move on a circle of radius 1 m. A body with its centre in the plane of this circle that
+    contains a ball of radius r is hit if its centre is nearer than 1 m + r to the rod's middle. A body inside a ball of
+    radius R is not hit if its centre is farther than √(1 + b²) m + R, where b is half the rod's width. Bodies are 2 mm
+    within or beyond these distances. No other force acts. So a body that was hit moves, and another body has not moved
+    by one bit.
     """
     count = on.pick(70, 14)
     turn = np.resize(TURNS, count)
@@ -77,11 +78,11 @@ def past_things(on: Setting) -> Sequence[Check]:
 
 
 def beside_wall(on: Setting) -> Sequence[Check]:
-    """A rod turns by 0.3 to 3 rad a step about its middle at a height below half its length: its end meets the wall.
+    """A rod rotates by 0.3 to 3 rad per step about its middle, lower than half its length: its end hits the wall below.
 
-    Its corners go round on circles of the radius √(1 + b²) m, b half its width, so that in half a turn one of them
-    would be as far below the middle: a rod higher than that (by 2 mm) keeps its velocity, 0, to the last bit; one whose
-    middle is lower is pushed up. No corner is deeper in the wall than two slops at the end.
+    Its corners move on circles of radius √(1 + b²) m, where b is half its width; within half a turn one of them would
+    be as far below the middle. A rod that is higher by 2 mm keeps its velocity, 0, to the last bit; a lower one is
+    pushed up. In the end no corner is deeper in the wall than two slops.
     """
     count = on.pick(70, 14)
     turn = np.resize(TURNS, count)

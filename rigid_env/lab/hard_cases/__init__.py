@@ -1,1 +1,1 @@
-"""The command `rigid-env hard-cases`: run `rigid_env.hard_cases` in our engine and in others, and show the outcomes."""
+"""Command `rigid-env hard-cases`: runs `rigid_env.hard_cases` in our engine and in others, and shows the outcomes."""

@@ -1,4 +1,4 @@
-"""Hard cases in other engines: a peer's run that looks like a `physics.World`."""
+"""Run hard cases in other engines, through a class with the interface of `physics.World`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigid_env.lab.measure.peers import Engine, Unsupported
 
 
 class PeerWorld:
-    """A scene in a peer: state, time and `step` of a `physics.World` of one world, nothing else of it."""
+    """World of another engine for a hard case: only state, `time` and `step` of a `physics.World` of one world."""
 
     def __init__(self, engine: Engine, scene: physics.Scene, dt: float, options: dict):
         try:
@@ -28,7 +28,7 @@ class PeerWorld:
         self.pos, self.quat, self.linvel, self.angvel = (np.asarray(part)[None] for part in self._run.state())
 
     def step(self, wrench=None, steps: int = 1) -> None:
-        """Advance by `steps`; a wrench cannot be handed on."""
+        """Advance by `steps` steps; this interface cannot pass a wrench to the engine."""
         if wrench is not None:
             raise UnsupportedError("a wrench is not handed to this engine")
         self._run.advance(steps)
@@ -37,10 +37,13 @@ class PeerWorld:
 
 
 def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
-    """The outcome of a case at a peer's first setting with which it holds, else at its defaults."""
+    """Run a case in another engine at its settings, one after the other, until it holds or is not supported.
+
+    Returns the outcome that holds; if there is none, the outcome at the first setting, the engine's defaults.
+    """
     outcomes = []
     for index in range(_setting_count(engine)):
-        used = ["default"]  # until the case makes its first world
+        used = ["default"]  # names of the settings used; the case adds one for each world that it makes
 
         def make(scene: physics.Scene, dt: float, index=index, used=used) -> PeerWorld:
             known = list(engine.settings(scene).items())
@@ -56,7 +59,7 @@ def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
 
 
 def _setting_count(engine: Engine) -> int:
-    """Settings that the engine has for a scene with contact, the kind with most."""
+    """Number of settings that the engine has for a scene with contact, the kind of scene with most settings."""
     body = physics.Sphere(1.0, 1.0, pos=(0, 2, 0))
     touching = [physics.Contact(0.5), physics.Friction(0.5), physics.Gravity()]
     return len(engine.settings(physics.Scene([body], [physics.HalfSpace((0, 1, 0))], touching)))

@@ -1,4 +1,4 @@
-"""Outcomes of hard cases as a picture."""
+"""Picture of the outcomes of hard cases."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigid_env.lab.measure.plotting import make_figure
 
 
 def write_picture(path: Path, report: Report) -> None:
-    """A square per case and setting: margin in colour, failures in red.
+    """Draw a square for each case and setting: green by its margin if the case holds, red if it fails.
 
     Raises
     ------

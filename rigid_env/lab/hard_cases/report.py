@@ -1,4 +1,4 @@
-"""The command `rigid-env hard-cases`: run, show, and keep what came out."""
+"""Run of the command `rigid-env hard-cases`: its settings, the outcomes, tables and the result file."""
 
 from __future__ import annotations
 
@@ -32,13 +32,15 @@ class Plan:
     ----------
     cases : tuple of Case
     accuracies : tuple of str
-        Presets.
+        Names of presets.
     dt : float
-        The step at which details are shown [s].
+        Step for which details are shown [s].
     steps : tuple of float
-        Further steps, for the table of which hold where [s]; empty: `dt` alone.
+        Further steps, for the table of cases and steps [s]; empty: only `dt`.
     is_thorough : bool
+        False: shorter runs.
     has_peers : bool
+        Whether other engines run the cases, too.
     """
 
     cases: tuple[Case, ...]
@@ -50,7 +52,7 @@ class Plan:
 
     @property
     def settings(self) -> list[Setting]:
-        """Every accuracy at every step, `dt` among them."""
+        """Settings for our engine: every accuracy at every step, `dt` among them."""
         steps = sorted({self.dt, *self.steps})
         return [Setting(name, dt, self.is_thorough) for name in self.accuracies for dt in steps]
 
@@ -58,7 +60,7 @@ class Plan:
 def make_plan(
     cases: tuple[Case, ...], accuracy: str, dt: float, steps: str, is_thorough: bool, has_peers: bool
 ) -> Plan:
-    """From what a user types: names and numbers with commas between them.
+    """Make a plan from what the user typed; `accuracy` and `steps` are lists with commas.
 
     Raises
     ------
@@ -88,9 +90,9 @@ class Report:
     ----------
     plan : Plan
     outcomes : tuple of Outcome
-        Ours, then those of other engines.
+        Outcomes of our engine, then those of other engines.
     is_complete : bool
-        False: interrupted.
+        False if the run was interrupted.
     """
 
     plan: Plan
@@ -99,28 +101,31 @@ class Report:
 
     @property
     def ours(self) -> list[Outcome]:
-        """Those of our engine."""
+        """Outcomes of our engine."""
         return [one for one in self.outcomes if one.engine == OURS]
 
     @property
     def details(self) -> list[Outcome]:
-        """Ours at the step at which details are shown."""
+        """Outcomes of our engine at the step for which details are shown."""
         return [one for one in self.ours if one.dt == self.plan.dt]
 
     @property
     def beside(self) -> list[Outcome]:
-        """Those of other engines, by case, each after ours at the first accuracy; none without other engines."""
+        """Outcomes for the comparison of engines, sorted by case; empty without other engines.
+
+        For each case, our outcome at the first accuracy stands before those of the other engines.
+        """
         theirs = [one for one in self.outcomes if one.engine != OURS]
         first = [one for one in self.details if one.accuracy == self.plan.accuracies[0] and one.case.peers]
         return sorted([*first, *theirs], key=lambda one: one.case.number) if theirs else []
 
     @property
     def has_failed(self) -> bool:
-        """True if a case of ours fails at that step; coarser and finer ones are there to show where it ends."""
+        """True if a case fails in our engine at the plan's `dt`; failures at the further steps only show the limits."""
         return any(one.status is Status.FAILS for one in self.details)
 
     def to_dict(self) -> dict:
-        """JSON-able."""
+        """Settings and outcomes as a dict for JSON."""
         plan = self.plan
         settings = {"accuracies": plan.accuracies, "dt": plan.dt, "steps": plan.steps, "is_thorough": plan.is_thorough}
         rows = [one.to_dict() for one in self.outcomes]
@@ -128,9 +133,10 @@ class Report:
 
 
 def run_and_show(console: Console, plan: Plan, keep: Path | None = None, place: Place | None = None) -> Report:
-    """Run all of it with a progress bar; print tables; `keep` holds all outcomes so far. Ctrl-C ends only the run.
+    """Run all cases of a plan with a progress bar, and print tables of the outcomes.
 
-    With `place` the cases of our engine run there, each at one setting; a place that prints its jobs runs none.
+    `keep` is a file that is updated with all outcomes after each run. Ctrl-C ends the runs; the tables are still
+    printed. With `place` the cases of our engine run there, each at one setting; a place that prints its jobs runs none.
 
     Raises
     ------
@@ -231,7 +237,7 @@ def _print(console: Console, report: Report) -> None:
             console.print(f"{accuracy}: {show.summary(found)}")
     if report.plan.steps:
         console.print(show.grid_table(report.ours, "at which steps each holds"))
-    if report.beside:  # the engine stands for the name of the case
+    if report.beside:  # this table shows the engine in place of the name of the case
         named = [replace(one, case=replace(one.case, name=f"{one.engine}, {one.accuracy}")) for one in report.beside]
         console.print(show.detail_table(named, "beside other engines"))
     if not report.is_complete:

@@ -1,4 +1,4 @@
-"""One hard case at one setting: whatever goes wrong inside it is an outcome."""
+"""Run one hard case at one setting; an exception in it becomes an outcome, too."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OURS = "rigid-env"
 
 
 class Status(Enum):
-    """Status of a case. Only `HOLDS` is a pass; only `FAILS` is a failure."""
+    """Status of a case at a setting: only `HOLDS` is a pass, and only `FAILS` is a failure."""
 
     HOLDS = "holds"
     FAILS = "fails"
@@ -24,7 +24,7 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a case.
+    """Outcome of one case at one setting.
 
     Attributes
     ----------
@@ -35,10 +35,11 @@ class Outcome:
         Step [s].
     status : Status
     checks : tuple of Check
+        Checks that the case made.
     reason : str
-        Why there are no checks, or what went wrong while it ran.
+        Reason for a missing check, or the error that ended the run.
     seconds : float
-        Wall clock, with compiling if there was any.
+        Wall-clock time of the run, compilation included [s].
     """
 
     case: Case
@@ -52,11 +53,11 @@ class Outcome:
 
     @property
     def tightest(self) -> Check | None:
-        """The check with the least margin, the first of equals; None where there are none."""
+        """Check with the smallest margin, the first among equals; None if there are no checks."""
         return min(self.checks, key=lambda check: check.margin, default=None)
 
     def to_dict(self) -> dict:
-        """JSON-able: numbers that are not finite become null."""
+        """Outcome as a dict for JSON; numbers that are not finite become null."""
         return {
             "number": self.case.number, "name": self.case.name, "engine": self.engine, "accuracy": self.accuracy,
             "dt": self.dt, "status": self.status.value, "reason": self.reason, "seconds": self.seconds,
@@ -78,17 +79,17 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
     case : Case
     setting : Setting
     engine, accuracy : str
-        As in `Outcome`; None: the setting's preset.
+        Names for the outcome, as in `Outcome`; without `accuracy` the setting's preset.
     """
     start, checks = time.perf_counter(), ()
     try:
-        with np.errstate(all="ignore"):  # what has blown up is for the checks to say
+        with np.errstate(all="ignore"):  # the checks report numbers that are not finite
             checks = tuple(case.run(setting))
         status = Status.HOLDS if checks and all(check.passes for check in checks) else Status.FAILS
         reason = "" if checks else "no check was made"
     except UnsupportedError as error:
         status, reason = Status.UNSUPPORTED, str(error)
-    except Exception as error:  # of one case: the others are still to be run
+    except Exception as error:  # an error in one case must not end the run of the others
         status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
     return Outcome(case, engine, accuracy or str(setting.accuracy), setting.dt, status, checks, reason, seconds)

@@ -1,4 +1,4 @@
-"""Outcomes of hard cases as tables in a terminal."""
+"""Tables of the outcomes of hard cases for a terminal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEGEND = "✓ holds   ✗ fails   - not supported"
 
 
 def came_out(outcome: Outcome) -> str:
-    """Describe the check with the least margin; else the reason why there is none."""
+    """Describe the check with the smallest margin: its value and limit. Without checks: the reason for having none."""
     check = outcome.tightest
     if check is None:
         return outcome.reason
@@ -29,7 +29,11 @@ def came_out(outcome: Outcome) -> str:
 
 
 def margin(outcome: Outcome) -> str:
-    """Share of the tightest limit that is left."""
+    """Smallest margin of the outcome's checks as text.
+
+    A margin is the part of a limit that the checked value leaves unused, in percent. A value far over its limit
+    (margin of -10 or less) is given as a multiple of the limit.
+    """
     check = outcome.tightest
     if check is None:
         return "-"
@@ -39,7 +43,7 @@ def margin(outcome: Outcome) -> str:
 
 
 def detail_table(outcomes: Sequence[Outcome], title: str) -> Table:
-    """Number, name, what came out, what must, margin, time, status; a row per outcome."""
+    """Table with a row for each outcome: number, name, tightest check, required outcome, margin, time and status."""
     must = Column("what must", under="what came out, tightest check")
     columns = [
         Column("#", is_number=True), Column("case", is_whole=True), Column("what came out, tightest check"), must,
@@ -55,7 +59,11 @@ def detail_table(outcomes: Sequence[Outcome], title: str) -> Table:
 
 
 def grid(outcomes: Sequence[Outcome]) -> tuple[list[tuple[str, float]], list[list[Outcome | None]]]:
-    """Accuracies and steps [s], and a row per case with an outcome for each of them, None where it was not run."""
+    """Arrange outcomes by case and setting.
+
+    Returns the settings as pairs of accuracy and step [s], and a row for each case with its outcome at each setting, or
+    None where it was not run.
+    """
     settings = list(dict.fromkeys((one.accuracy, one.dt) for one in outcomes))
     found: dict[int, dict] = {}
     for one in outcomes:
@@ -64,7 +72,7 @@ def grid(outcomes: Sequence[Outcome]) -> tuple[list[tuple[str, float]], list[lis
 
 
 def grid_table(outcomes: Sequence[Outcome], title: str) -> Table:
-    """A row per case, a column per accuracy and step."""
+    """Table with a row for each case and a column for each pair of accuracy and step."""
     settings, rows = grid(outcomes)
     names = [f"{accuracy}\n{1e3 * dt:g} ms" for accuracy, dt in settings]
     table = Table([Column("#", is_number=True), Column("case", is_whole=True), *number_columns(*names)], title, LEGEND)
@@ -76,6 +84,6 @@ def grid_table(outcomes: Sequence[Outcome], title: str) -> Table:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """Count those that hold, fail, and so on."""
+    """Text with the number of outcomes of each status."""
     counts = {status: sum(one.status is status for one in outcomes) for status in Status}
     return ", ".join(f"{count} {status.value}" for status, count in counts.items() if count)

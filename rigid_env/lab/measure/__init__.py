@@ -1,9 +1,10 @@
-"""Measure speed and accuracy: what `rigid-env bench`, `rigid-env accuracy` and `benchmarks/` share.
+"""Measurements of speed and accuracy that `rigid-env bench`, `rigid-env accuracy` and `benchmarks/` share.
 
-`timing` takes turns and has the arithmetic (repeats, medians, ratios), `machine` says where a number was measured and
-writes it, `workloads` is the work our engine is given, `mujoco_scene` the same work for MuJoCo, `rows` pairs the two,
+For speed: `timing` repeats measurements in turns and computes medians and ratios, `machine` describes the machine of a
+result, `workloads` is the work of our engine, `mujoco_scene` is the same work for MuJoCo, `rows` pairs the two,
 `environments` is the work of environments, and `table` prints.
 
-Error against time is `physics.frontier`'s: `truths` are scenes with a known outcome, `peers` other engines on them,
-`accuracy` pairs them, `accuracy_table` and `accuracy_plot` show, `accuracy_report` runs all of it in a terminal.
+For error against time, which `physics.frontier` measures: `truths` are scenes with a known outcome, `peers` are other
+engines, `accuracy` pairs them, `accuracy_table` and `accuracy_plot` show results, and `accuracy_report` runs all of it
+in a terminal.
 """

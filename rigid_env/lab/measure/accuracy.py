@@ -1,4 +1,4 @@
-"""Measure error against time of known scenes, for `rigid-env accuracy` and `benchmarks.accuracy`."""
+"""Measure error against computing time on known scenes, for `rigid-env accuracy` and `benchmarks.accuracy`."""
 
 from __future__ import annotations
 
@@ -16,28 +16,30 @@ from rigid_env.lab.measure import peers
 from rigid_env.lab.measure.truths import CASES, Case
 from rigid_env.tasks.scene_source import ENDINGS, SCENE_FILES, find_scene
 
-# Peers are measured at smaller steps, too, at which they do better.
+# Other engines are measured at smaller steps, too, since they are more accurate there.
 PEER_STEPS = (*STEPS, 0.0005)  # [s]
 
-# Scenes without a closed form that are measured where none are named, and for how long [s].
+# Scenes without a closed form that are measured by default, and their durations [s].
 OPEN = {"drop": 3.0, "corner_drop": 3.0, "vertex_drop": 2.0}
-DURATION = 2.0  # of other scenes [s]
+DURATION = 2.0  # duration of other scenes without a closed form [s]
 
 Tick = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Settings that are measured for each scene.
+    """Accuracies and steps that are measured for each scene.
 
     Attributes
     ----------
     accuracies : tuple of str
+        Presets of our engine.
     steps : tuple of float, or None
-        [s]; None: those of `physics.ladder`, coarser ones for event-driven accuracies among them.
+        Steps of our engine [s]; None: those of `physics.ladder`, with larger ones for event-driven accuracies.
     peer_steps : tuple of float
-        [s].
+        Steps of other engines [s].
     repeats : int
+        Repeats of each timing.
     """
 
     accuracies: tuple[str, ...] = frontier_run.SHOWN_PRESETS
@@ -51,20 +53,21 @@ QUICK = Ladder(steps=STEPS[:2], peer_steps=STEPS[:1], repeats=1)
 
 @dataclass(frozen=True)
 class Job:
-    """A scene, and the contenders that are measured on it.
+    """Scene with the contenders that are measured on it.
 
     Attributes
     ----------
     key, what : str
-        Name for programs and for people.
+        Name for programs, and description for people.
     scene : Scene
     duration : float
-        [s].
+        Simulated time [s].
     case : Case or None
-        None: no closed form, compared with our reference.
+        Known outcome of the scene; None: no closed form, compared with our reference.
     contenders : tuple of Contender
+        Engines, each at one setting and one step.
     skipped : tuple of str
-        Why some peers, or settings of theirs, do not take part.
+        Reasons for which other engines, or some of their settings, do not take part.
     """
 
     key: str
@@ -77,19 +80,19 @@ class Job:
 
     @property
     def goals(self) -> tuple[tuple[float, float], ...]:
-        """Goals (error, µs per simulated second), each pair to be reached by one setting."""
+        """Goals (error, µs per simulated second); one setting must reach both numbers of a goal."""
         return self.case.goals if self.case else ()
 
 
 @dataclass(frozen=True)
 class Found:
-    """A job and its measurements."""
+    """Measurements of one job."""
 
     job: Job
     frontier: physics.Frontier
 
     def goals_met(self) -> list[tuple[float, float, physics.FrontierPoint | None]]:
-        """Quickest setting of ours that reaches each goal (error, µs), or None."""
+        """Goals (error, µs) of the job, each with the quickest setting of our engine that reaches it, or None."""
         met = []
         for error, us in self.job.goals:
             point = self.frontier.cheapest(error, engine=OURS)
@@ -97,7 +100,7 @@ class Found:
         return met
 
     def to_dict(self) -> dict:
-        """Scene and points as rows, ready for JSON."""
+        """Scene, points and settings as a dict for JSON."""
         content = self.frontier.to_dict()
         goals = [
             {"error": error, "us": us, "reached_by": None if point is None else str(point)}
@@ -117,7 +120,8 @@ class Found:
 def names() -> list[str]:
     """Names of all scenes that can be measured, those with a closed form first.
 
-    Not those of several bodies that touch each other: the event-driven presets, truth of all others, do not know them.
+    Canonical scenes with several bodies are not among them: their truth would be an event-driven preset, which does not
+    support bodies that touch each other.
     """
     known = [case.key for case in CASES]
     alone = (name for name in scenes.SCENES if len(scenes.by_name(name).bodies) == 1)
@@ -125,12 +129,12 @@ def names() -> list[str]:
 
 
 def load_peers(wanted: Sequence[str]) -> tuple[dict[str, peers.Engine], list[str]]:
-    """Return the installed peers of these names, and a message about the missing ones.
+    """Load other engines by name; returns the installed ones, and a message for each missing one.
 
     Raises
     ------
     ValueError
-        There is no such peer.
+        There is no engine of such a name.
     """
     found, missing = {}, []
     for name in wanted:
@@ -152,11 +156,12 @@ def make_jobs(
     Parameters
     ----------
     wanted : sequence of str
-        Of `names`, or scene files; none: those with a closed form, and `OPEN`.
-    engines : mapping of Engine, optional
+        Names from `names`, or scene files; empty: the scenes with a closed form, and `OPEN`.
+    engines : mapping of str to Engine, optional
+        Other engines that are measured, too.
     ladder : Ladder, optional
     duration : float, optional
-        Of scenes without a closed form [s]; None: that of `OPEN`, or `DURATION`.
+        Duration of scenes without a closed form [s]; None: that of `OPEN`, or `DURATION`.
 
     Raises
     ------
@@ -179,7 +184,10 @@ def run_count(jobs: Sequence[Job], ladder: Ladder) -> int:
 
 
 def run(jobs: Sequence[Job], ladder: Ladder, tick: Tick = lambda what: None) -> Iterator[Found]:
-    """Measure jobs one by one; an interruption ends the run after the finished part of the current job."""
+    """Measure jobs one by one, and yield the measurements of each.
+
+    An interruption ends the run; the finished part of the current job is still yielded. `tick` is called with a text.
+    """
     for job in jobs:
         truth = job.case.truth() if job.case else None
 
@@ -188,7 +196,7 @@ def run(jobs: Sequence[Job], ladder: Ladder, tick: Tick = lambda what: None) -> 
 
         try:
             found = frontier_run.measure(job.contenders, job.scene, job.duration, truth, ladder.repeats, tell)
-        except KeyboardInterrupt:  # before there was a truth
+        except KeyboardInterrupt:  # interrupted before the truth was computed
             return
         if found.points:
             yield Found(job, found)

@@ -1,4 +1,4 @@
-"""Error against time as a picture: one panel per scene, both axes logarithmic."""
+"""Plot of error against computing time: one panel per scene, both axes logarithmic."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ COLUMNS = 3
 
 
 def write_plot(results: Sequence[Found], path: str | Path, has_goals: bool = False) -> None:
-    """Draw the results into a file whose ending gives the format (png, svg, pdf); our own goals only on request.
+    """Draw measurements into a file whose ending gives the format (png, svg, pdf).
+
+    `has_goals` also draws the goals of this project.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Run a measurement of error against time in a terminal: progress, tables, result file."""
+"""Measure error against computing time in a terminal, with progress, tables and a result file."""
 
 from __future__ import annotations
 
@@ -21,14 +21,16 @@ from rigid_env.terminal import progress_bar
 
 @dataclass(frozen=True)
 class Report:
-    """Measurements of a run.
+    """Measurements of a run of `rigid-env accuracy`.
 
     Attributes
     ----------
     results : tuple of Found
+        Measured scenes.
     ladder : Ladder
+        Accuracies and steps of the run.
     is_complete : bool
-        False: interrupted.
+        False if the run was interrupted.
     """
 
     results: tuple[Found, ...]
@@ -38,16 +40,16 @@ class Report:
 
 @dataclass(frozen=True)
 class Shown:
-    """Parts of a measurement that are printed beside its points.
+    """Choice of what is printed with the points of a measurement.
 
     Parameters
     ----------
     is_full : bool
-        Every point.
+        Print every point.
     has_goals : bool
-        Our own goals, and which setting reaches them.
+        Print the goals of this project, and which setting reaches each.
     below : float, optional
-        The cheapest setting below this error, in each scene's unit.
+        Print the cheapest setting with an error below this one, in each scene's unit.
     """
 
     is_full: bool = False
@@ -64,7 +66,7 @@ def measure_and_show(
     shown: Shown | None = None,
     place: Place | None = None,
 ) -> Report:
-    """Measure scenes, and print the table of each once it is measured.
+    """Measure scenes, and print the table of each as soon as it is measured.
 
     With `place` each scene is measured there; a place that prints its jobs measures none.
 
@@ -74,7 +76,7 @@ def measure_and_show(
     scenes : sequence of str
         See `accuracy.make_jobs`.
     peers : str
-        Names with commas between them.
+        Names of other engines, with commas.
     ladder : Ladder, optional
     duration : float, optional
         See `accuracy.make_jobs`.
@@ -84,7 +86,7 @@ def measure_and_show(
     Raises
     ------
     ValueError
-        No such scene or peer, or `shown.below` or `duration` is not positive.
+        No such scene or engine, or `shown.below` or `duration` is not positive.
     """
     shown = shown or Shown()
     if shown.below is not None:
@@ -119,7 +121,7 @@ def measure_and_show(
 
 
 def write_result(path: Path, report: Report) -> None:
-    """Write results as JSON: settings, scenes, and all points as ``rows``, with machine, versions and commit."""
+    """Write results as JSON: settings, scenes, all points as ``rows``, and machine, versions and commit."""
     presets = {name: asdict(physics.PRESETS[name]) for name in report.ladder.accuracies}
     scenes, rows = [], []
     for found in report.results:
@@ -132,7 +134,7 @@ def write_result(path: Path, report: Report) -> None:
 
 
 def _row(case: str, measure: str, point: dict) -> dict:
-    """A point with its time in µs per simulated second; `error` is null where it is not finite."""
+    """Point of a measurement for JSON, with its time in µs per simulated second; an infinite error is null."""
     rest = {name: value for name, value in point.items() if name not in ("cost", "costs")}
     times = {"us": 1e6 * point["cost"], "us_samples": [1e6 * cost for cost in point["costs"]]}
     return {"case": case, "error": point["errors"].get(measure), **times, **rest}

@@ -1,4 +1,4 @@
-"""Error against time as tables in a terminal."""
+"""Tables of error against computing time for a terminal."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ MARKS = "* nothing is better in less time   = as good as the truth is known   ! 
 
 
 def make_table(found: Found, is_full: bool = False) -> Table:
-    """The points of one scene, quickest first.
+    """Table of the points of one scene, quickest first.
 
     Parameters
     ----------
     found : Found
     is_full : bool
-        Every point; else, where there are peers, each engine's own front and the best of each of its settings.
+        True: every point. False, with other engines: the front of each engine, and the best point of each setting.
     """
     frontier = found.frontier
     shown = frontier.points if is_full or not _has_peers(found) else _own_fronts(frontier)
@@ -34,7 +34,7 @@ def make_table(found: Found, is_full: bool = False) -> Table:
 
 
 def goals(found: Found) -> list[str]:
-    """Lines under a table: our goals for the scene, and the setting that reaches each."""
+    """Lines below a table: the goals of this project for the scene, and the setting that reaches each."""
     unit, lines = found.frontier.units[found.frontier.measure], []
     for error, us, point in found.goals_met():
         how = f"reached by {point} in {1e6 * point.cost:.0f} µs" if point else "not reached"
@@ -43,7 +43,7 @@ def goals(found: Found) -> list[str]:
 
 
 def summary(found: Found) -> list[str]:
-    """Lines under a table: dependence of each of our settings on the step, and peers that could not take part."""
+    """Lines below a table: how the error of each of our settings depends on the step, and skipped engines."""
     frontier, lines = found.frontier, []
     for engine, setting in frontier.families():
         if engine == OURS:
@@ -57,7 +57,7 @@ def summary(found: Found) -> list[str]:
 
 
 def answers(found: Found, error: float) -> list[str]:
-    """Cheapest setting below an error: of ours, and with peers of all."""
+    """Lines with the cheapest setting below an error: of our engine, and of all engines if there are others."""
     lines = [f"{found.job.key}, ours: {found.frontier.advice(error, engine=OURS)}"]
     if _has_peers(found):
         lines.append(f"{found.job.key}, all: {found.frontier.advice(error)}")
@@ -88,7 +88,7 @@ def _has_peers(found: Found) -> bool:
 
 
 def _own_fronts(frontier: physics.Frontier) -> list[physics.FrontierPoint]:
-    """Each engine's front, and the best point of each setting, so that every engine and setting is shown."""
+    """Points on the front of each engine, and the best point of each setting, so that every setting is shown."""
     shown = [p for engine in dict.fromkeys(p.engine for p in frontier.points) for p in frontier.front(engine=engine)]
     for engine, setting in frontier.families():
         best = min(frontier.of(setting, engine), key=lambda p: (frontier.error(p), p.cost))

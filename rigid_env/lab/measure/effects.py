@@ -1,4 +1,4 @@
-"""Cost of an effect: a scene with it and the same scene without, step for step, in turns."""
+"""Measure the computing time of an effect: a scene with it and the same scene without it, run in turns."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from physics.keywords import nearest_first
 from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
 
 STEP = 0.005  # [s]
-STEPS = 20_000  # of one run
+STEPS = 20_000  # steps of one run
 QUICK_STEPS = 500
 ON, OFF = "on", "off"
 
@@ -24,30 +24,30 @@ BALL = physics.Sphere(0.5, 2.0, pos=(0.0, 0.5, 0.0), linvel=(5.0, 0.0, 0.0), ang
 BOUNCING = physics.Sphere(0.5, 2.0, pos=(0.0, 1.5, 0.0), linvel=(5.0, 0.0, 0.0), angvel=(0.0, 3.0, 1.0))
 TOUCH = (GRAVITY, physics.Contact(), physics.Friction(50.0))
 
-# A slope on which a slab slides for ever, across the grain.
+# A slope on which a slab slides without end, across the axis of anisotropic friction.
 SLAB = physics.Block((2.0, 0.2, 2.0), 2.0, pos=(0.0, 0.1, 0.0))
 SLOPE = physics.Gravity((5.0, -8.0, 3.0))
 
 
 def _flying() -> physics.Body:
-    """The tumbling block."""
+    """The tumbling block of the canonical scene "tumble"."""
     return scenes.tumble().bodies[0]
 
 
 def _case(effect, *others, bodies=None, walls=()) -> tuple[physics.Scene, physics.Scene]:
-    """Make scenes of bodies with and without the effect, both with `others`; one body in flight by default."""
+    """Make two scenes, with and without the effect, both with `others`; one body in flight by default."""
     bodies = bodies or [_flying()]
     return tuple(physics.Scene(bodies, walls, [*others, *extra]) for extra in ((effect,), ()))
 
 
 def _bouncing() -> tuple[physics.Scene, physics.Scene]:
-    """A superball, and a ball that sticks at impacts."""
+    """Two scenes of a bouncing ball: with tangential restitution (a superball), and with sticking impacts."""
     laws = (physics.Contact(1.0, tangential=1.0), physics.Contact(1.0))
     return tuple(physics.Scene([BOUNCING], [FLOOR], [GRAVITY, law, physics.Friction(50.0)]) for law in laws)
 
 
 def _soft() -> tuple[physics.Scene, physics.Scene]:
-    """The block at rest on springs, and on rock."""
+    """Two scenes of the block at rest: on compliant contacts with stiffness and damping, and on rigid contacts."""
     scene = scenes.rest()
     others = [effect for effect in scene.effects if not isinstance(effect, physics.Contact)]
     laws = (physics.Contact(stiffness=1e5, damping=1e3), physics.Contact())
@@ -55,7 +55,7 @@ def _soft() -> tuple[physics.Scene, physics.Scene]:
 
 
 def _grained() -> tuple[physics.Scene, physics.Scene]:
-    """The slope with two coefficients of friction, and with one."""
+    """Two scenes of a sliding slab: with two coefficients of friction, and with one."""
     laws = (physics.Friction((0.2, 0.4), axis=(0.0, 0.0, 1.0)), physics.Friction(0.3))
     return tuple(physics.Scene([SLAB], [FLOOR], [SLOPE, physics.Contact(), law]) for law in laws)
 
@@ -65,7 +65,10 @@ def _pair() -> list[physics.Body]:
 
 
 def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
-    """Block at rest with and without an effect of contact; it falls without `Contact`."""
+    """Two scenes of the block at rest: with an effect of contact of class `kind`, and without it.
+
+    Without `Contact` the block falls.
+    """
     scene = scenes.rest()
     gone = {physics.Contact: (physics.Contact, physics.Friction)}.get(kind, (kind,))
     without = [effect for effect in scene.effects if not isinstance(effect, gone)]
@@ -73,7 +76,7 @@ def _touching(kind: type) -> tuple[physics.Scene, physics.Scene]:
 
 
 def _resting() -> tuple[physics.Scene, physics.Scene]:
-    """Block at rest that sleeps after a second and a half, and one that never does."""
+    """Two scenes of the block at rest: with sleeping, which starts after a second and a half, and without."""
     scene = scenes.rest()
     return physics.Scene(scene.bodies, scene.walls, [*scene.effects, physics.Sleeping()]), scene
 
@@ -102,7 +105,7 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
 
 
 class Steps:
-    """Steps of one world from its start."""
+    """Callable that runs steps of one world from its start, and returns steps per second."""
 
     def __init__(self, scene: physics.Scene, accuracy: str, steps: int):
         self.world = physics.World(scene, dt=STEP, accuracy=accuracy)
@@ -116,17 +119,17 @@ class Steps:
 
 
 def bytes_per_body(world: physics.World) -> int:
-    """Bytes of parameters, and of the state of sleep, that a world stores per body."""
+    """Bytes that a world stores per body for parameters and sleep."""
     return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """The effects to measure: those of the names, all where there are none.
+    """Check names of effects, and return them; all effects if there are none.
 
     Raises
     ------
     ValueError
-        A name that is none of `CASES`.
+        A name that is not in `CASES`.
     """
     for name in names:
         if name not in CASES:
@@ -135,18 +138,18 @@ def chosen(names: Sequence[str]) -> list[str]:
 
 
 def run_count(effects: int, repeats: int) -> int:
-    """Number of calls of `tick` by `effect_row`, over so many effects."""
+    """Number of calls of `tick` by `effect_row` for this number of effects."""
     return effects * 2 * (repeats + 1)
 
 
 def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callable[[str], None] | None = None) -> Row:
-    """Measure one effect of `CASES`.
+    """Measure one effect of `CASES`; `tick` is called with a text before each run.
 
     Returns
     -------
     Row
-        Steps per second with the effect, against those without it. In `notes`: what the effect adds to a step
-        [ns], and the bytes of parameters that its scene stores more per body.
+        Steps per second with the effect, compared with those without it. `notes` has the time that the effect adds to a
+        step [ns], and the bytes of parameters that it adds per body.
     """
     runners = {key: Steps(scene, accuracy, steps) for key, scene in zip((ON, OFF), CASES[name]())}
     told = None if tick is None else lambda key: tick(f"{name}: {key}")

@@ -1,4 +1,4 @@
-"""Measure environments with random actions, resets included: environment steps per second."""
+"""Measure the steps per second of environments with random actions, resets included."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from rigid_env.lab.measure.workloads import STEP
 
 ENV_ID = f"{NAMESPACE}/BlockReach-v0"
 SUBSTEPS = 5
-PHYSICS = {"dt": STEP, "frame_skip": SUBSTEPS}  # of both ours and the peer's
+PHYSICS = {"dt": STEP, "frame_skip": SUBSTEPS}  # the same in our environments and the compared ones
 UNIT = "env steps/s"
 SEED = 5
 ACTIONS = 64  # different random actions, or batches of them, used in turns
-THREADS = (1, 2)  # of the vector environment
+THREADS = (1, 2)  # numbers of threads of the vector environment
 VECTOR_TARGET = 25.0
 SINGLE_TARGET = 3.0
 
 
 @dataclass(frozen=True)
 class EnvSizes:
-    """Work of one run: environments and steps, ours and the peer's."""
+    """Size of one run: numbers of environments and steps, for our environments and the compared ones (`peer_...`)."""
 
     envs: int = 1024
     vector_steps: int = 100
@@ -44,7 +44,7 @@ def environment_ids() -> list[str]:
 
 
 class Single:
-    """One environment, stepped with random actions and reset at the end of each episode."""
+    """Callable that steps one environment with random actions, with resets, and returns steps per second."""
 
     def __init__(self, env: gymnasium.Env, steps: int):
         self.env, self.steps = env, steps
@@ -63,7 +63,7 @@ class Single:
 
 
 class Vector:
-    """A vector environment, stepped with random actions; it resets its environments automatically."""
+    """Callable that steps a vector environment with random actions and automatic resets; returns steps per second."""
 
     def __init__(self, envs: gymnasium.vector.VectorEnv, steps: int):
         self.envs, self.steps = envs, steps
@@ -80,15 +80,15 @@ class Vector:
 
 @dataclass(frozen=True)
 class EnvPeer:
-    """Another implementation for comparison: its name, and a maker of its environments.
+    """Other implementation of the environments, for comparison.
 
     Attributes
     ----------
     name : str
     make : callable
-        () -> one environment, through `gymnasium.make` as ours is.
+        () -> one environment, made by `gymnasium.make` as ours is.
     make_vector : callable
-        number -> vector environment of so many.
+        n -> vector environment of n environments.
     """
 
     name: str
@@ -99,14 +99,17 @@ class EnvPeer:
 def environment_rows(
     sizes: EnvSizes, repeats: int, peer: EnvPeer | None = None, tick: Tick | None = None
 ) -> Iterator[list[Row]]:
-    """Measure the vector environment, the single one through `gymnasium.make`, and the single one bare.
+    """Measure the vector environment, a single one with Gymnasium's wrappers, and a single one without them.
+
+    Yields the rows of each as soon as they are measured.
 
     Parameters
     ----------
     sizes : EnvSizes
     repeats : int
-        Of every contestant, in turns.
+        Repeats of every measurement, in turns.
     peer : EnvPeer, optional
+        Other implementation that is measured, too.
     tick : callable, optional
         Called before each run with its name.
     """

@@ -1,4 +1,4 @@
-"""Machine and versions of a measurement; every result contains them."""
+"""Describe the machine and the versions of a measurement, for its result file."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ PACKAGES = (
     "pygame-ce", "stable-baselines3", "matplotlib",
 )  # fmt: skip
 
-# Results of earlier measurements do not make a checkout differ from its commit.
+# Changes in this folder of results do not count as changes of the checkout.
 RESULTS = "benchmarks/results"
-GIT = 60.0  # time that git may take; what it would tell is then left out [s]
+GIT = 60.0  # longest time of a git command; after that its result is left out [s]
 
 
 def describe() -> dict:
-    """The machine, the versions, the commit and the date, JSON-able."""
+    """Machine, versions of packages, commit and date, as a dict for JSON."""
     return {
         "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         "system": platform.platform(),
@@ -48,12 +48,12 @@ def processor() -> str:
 
 
 def usable_cores() -> int:
-    """Cores that this process may use: its affinity and its container's quota allow them."""
+    """Number of cores that this process may use, by its affinity and the quota of its container."""
     return processors.usable()
 
 
 def version(package: str) -> str | None:
-    """Installed version of a distribution, or None."""
+    """Installed version of a distribution, or None if it is not installed."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -79,7 +79,7 @@ def _git(folder: Path, *arguments: str) -> str:
 
 
 def write_json(path: str | Path, content: dict) -> None:
-    """Write a result as JSON, with the machine under ``machine``; missing folders are made."""
+    """Write a result as JSON, with a description of the machine under ``machine``; makes missing folders."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**content, "machine": describe()}, indent=2, allow_nan=False)

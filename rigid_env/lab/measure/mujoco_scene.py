@@ -1,10 +1,10 @@
-"""The scenes of `workloads` in MuJoCo, with its default integrator (Euler) and solver settings.
+"""Scenes of `workloads` in MuJoCo, with its default integrator (Euler) and solver settings.
 
-MuJoCo is imported when a scene is made. It appends its warnings to ``MUJOCO_LOG.TXT`` in the working folder:
-run under `elsewhere`.
+MuJoCo is imported when a scene is made. It appends warnings to ``MUJOCO_LOG.TXT`` in the working folder; use
+`elsewhere` to keep that file out of the user's folder.
 
-The model is not that of `peers.mujoco`: MuJoCo steps a body whose inertia is that of its box about 5 % faster than one
-whose inertia is given, though both move alike, to the last digit shown.
+The model differs from that of `peers.mujoco`: MuJoCo steps a body about 5 % faster if its inertia is computed from its
+box instead of given, although both move alike to the last printed digit.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from rigid_env.lab.measure.workloads import (
 )
 
 FRICTION = 0.5
-BLOCK = 1  # index of the block among the bodies; 0 is the world
+BLOCK = 1  # index of the block among MuJoCo's bodies; 0 is the world
 
 
 def is_installed() -> bool:
@@ -40,7 +40,7 @@ def is_installed() -> bool:
 
 @contextlib.contextmanager
 def elsewhere():
-    """Work in a temporary folder during the block, where MuJoCo may leave its log."""
+    """Context manager that changes to a temporary working folder, in which MuJoCo may write its log."""
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -51,7 +51,7 @@ def elsewhere():
 
 
 def model_xml(height: float = scenes.SIZE[1] / 2) -> str:
-    """The block in the three-wall box, its centre at `height` [m] above the floor, as MJCF."""
+    """MJCF text of the block in the three-wall box, with its centre at `height` [m] above the floor."""
     half = " ".join(str(edge / 2) for edge in scenes.SIZE)
     friction, width = f'friction="{FRICTION} 0 0"', scenes.HALF_WIDTH
     return f"""<mujoco>
@@ -70,7 +70,7 @@ def model_xml(height: float = scenes.SIZE[1] / 2) -> str:
 
 
 def make_model(height: float = scenes.SIZE[1] / 2):
-    """`mujoco.MjModel` and `mujoco.MjData` of `model_xml`."""
+    """Make `mujoco.MjModel` and `mujoco.MjData` from `model_xml`."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_string(model_xml(height))
@@ -78,7 +78,7 @@ def make_model(height: float = scenes.SIZE[1] / 2):
 
 
 class Flight:
-    """As `workloads.Flight`."""
+    """Work of `workloads.Flight` in MuJoCo."""
 
     def __init__(self, sizes: Sizes = FULL):
         import mujoco
@@ -99,7 +99,7 @@ class Flight:
 
 
 class Rest:
-    """As `workloads.Rest`; before each run the block settles again for as long as the batch does."""
+    """Work of `workloads.Rest` in MuJoCo; before each run the block settles for `LANDING_STEPS` steps."""
 
     def __init__(self, sizes: Sizes = FULL):
         import mujoco
@@ -116,7 +116,7 @@ class Rest:
 
 
 class Shove:
-    """As `workloads.Shove`."""
+    """Work of `workloads.Shove` in MuJoCo."""
 
     def __init__(self, sizes: Sizes = FULL):
         import mujoco
@@ -134,7 +134,7 @@ class Shove:
         return len(self.wrenches) * HOLD / watch.seconds
 
     def notes(self) -> dict:
-        """Share of shoves that end in contact, over one more run."""
+        """Share of the wrenches after which the block touches a wall, from one more run."""
         self.mujoco.mj_resetData(self.model, self.data)
         touching = 0
         for wrench in self.wrenches:
@@ -145,7 +145,7 @@ class Shove:
 
 
 def landed_states(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
-    """qpos (worlds, 7) and qvel (worlds, 6) of the batch's blocks after their fall."""
+    """State of the batch's blocks after their fall: qpos (worlds, 7) and qvel (worlds, 6)."""
     import mujoco
 
     model, data = make_model()
@@ -160,7 +160,7 @@ def landed_states(sizes: Sizes) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Batch:
-    """As `workloads.Batch`, with `mujoco.batch` (MuJoCo 4)."""
+    """Work of `workloads.Batch` by `mujoco.batch` (MuJoCo 4)."""
 
     def __init__(self, sizes: Sizes, landed: tuple[np.ndarray, np.ndarray]):
         from mujoco import batch
@@ -184,7 +184,7 @@ class Batch:
 
 
 class Rollout:
-    """As `workloads.Batch`, with `mujoco.rollout`, MuJoCo's quickest way: it gets all wrenches at once."""
+    """Work of `workloads.Batch` by `mujoco.rollout`, MuJoCo's quickest way, which gets all wrenches at once."""
 
     def __init__(self, sizes: Sizes, landed: tuple[np.ndarray, np.ndarray]):
         import mujoco

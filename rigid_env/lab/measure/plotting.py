@@ -1,4 +1,4 @@
-"""Figures of every plot of the command line, and what they require."""
+"""Figures for the plots of the command line, and the check that matplotlib is installed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ PURPOSE = "a plot"
 
 
 def require_matplotlib() -> None:
-    """Raise an error with the line that installs matplotlib, before a measurement.
+    """Raise an error with the command that installs matplotlib, if it is missing; called before a measurement.
 
     Raises
     ------
@@ -19,12 +19,12 @@ def require_matplotlib() -> None:
 
 
 def lacks_matplotlib() -> str:
-    """Line that installs matplotlib; "" where it is installed."""
+    """Message with the command that installs matplotlib; "" if it is installed."""
     return lacking("plot", "matplotlib", purpose=PURPOSE)
 
 
 def make_figure(width: float, height: float):
-    """A `matplotlib.figure.Figure` of this size [in], written without a display.
+    """Make a `matplotlib.figure.Figure` of this size [in], which needs no display.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Measure the same work in our engine and MuJoCo, in turns: the rows of a throughput table."""
+"""Measure the same work in our engine and in MuJoCo, in turns, as rows of a throughput table."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rigid_env.lab.measure.workloads import Sizes
 ACCURACIES = ("fast", "balanced")
 UNIT = "steps/s"
 MUJOCO = "MuJoCo mj_step"
-LARGEST_RESIDUAL = 1e-6  # of the block at rest, relative
+LARGEST_RESIDUAL = 1e-6  # largest valid residual of the block at rest, relative
 
-# key: (what, least ratio to MuJoCo, class in `workloads` and `mujoco_scene`)
+# Row: (description, target for the ratio to MuJoCo, class in `workloads` and `mujoco_scene`)
 SINGLE = {
     "flight": ("free flight", 25.0, "Flight"),
     "rest": ("at rest, 4 contacts", 12.0, "Rest"),
@@ -25,15 +25,16 @@ Tick = Callable[[str], None]
 
 
 def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None = None) -> Iterator[list[Row]]:
-    """Measure flight, rest, shoves and the batch; yield the rows of each once they are measured.
+    """Measure flight, rest, shoves and the batch; yield the rows of each as soon as they are measured.
 
     Parameters
     ----------
     sizes : Sizes
+        Work of one run.
     repeats : int
-        Of every contestant, in turns.
+        Repeats of every measurement, in turns.
     with_peer : bool
-        Whether MuJoCo is measured too.
+        Whether MuJoCo is measured, too.
     tick : callable, optional
         Called before each run with its name.
     """
@@ -43,18 +44,18 @@ def engine_rows(sizes: Sizes, repeats: int, with_peer: bool, tick: Tick | None =
 
 
 def paired_rows(spreads: dict[str, Spread], peers: dict[str, str], notes: dict | None = None, **common) -> list[Row]:
-    """Make one row for each of our contestants (named by accuracy), each against the fastest peer.
+    """Make a row for each accuracy of our engine, compared with the fastest other engine.
 
     Parameters
     ----------
-    spreads : dict of Spread
-        Of our contestants and the peers.
-    peers : dict of str
-        Names of the peers among `spreads`, and what to call them.
-    notes : dict of dict, optional
-        For `Row.notes`, under our contestants' names.
+    spreads : dict of str to Spread
+        Measurements, ours by accuracy, others by the keys of `peers`.
+    peers : dict of str to str
+        Name of each other engine for the table, by its key in `spreads`.
+    notes : dict of str to dict, optional
+        `Row.notes` of each accuracy.
     common
-        Fields of `Row` that all share.
+        Fields of `Row` that are the same for all rows.
     """
     peer = fastest(spreads, list(peers)) if peers else None
     return [
@@ -75,7 +76,7 @@ def run_count(repeats: int, with_peer: bool) -> int:
 
 
 def told(tick: Tick | None, what: str) -> Tick | None:
-    """Make a `tick` that puts `what` before the contestant's name."""
+    """Make a function that calls `tick` with `what` before the given name; None if `tick` is None."""
     return None if tick is None else lambda name: tick(f"{what}: {name}")
 
 

@@ -1,8 +1,8 @@
-"""Share of each effect in a run: the number of steps in which it acts, and its share of the time.
+"""Share of each effect in a run: the number of steps in which it acts, and its share of the computing time.
 
-An effect acts in a step if the step from the same state without it ends elsewhere, by one bit at least. Its time is
-that of the run less that of the same scene's run without it, in turns; without it the bodies may take another course
-(without contact they fall for ever), which the time then is that of.
+An effect acts in a step if the same step without it ends in another state, by at least one bit. Its time is the time of
+the run minus that of the same scene without it, measured in turns. Without the effect the bodies may move differently
+(without contact they fall without end), which is part of this difference.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ import physics
 from rigid_env.lab.measure.timing import Spread, Stopwatch, interleave
 from rigid_env.terminal import Column, Table, number_columns
 
-STEP = 0.01  # [s], as `rigid-env run` takes
+STEP = 0.01  # [s] default step of `rigid-env run`
 WHOLE = "whole"
 REPEATS = 5
 
 
 @dataclass(frozen=True)
 class Share:
-    """One effect of a scene in a run.
+    """Share of one effect in a run.
 
     Attributes
     ----------
     effect : str
+        Name of the effect.
     acted : float
-        Share of the steps in which it changed something.
+        Share of the steps in which the effect changed the state.
     time : Spread
-        Share of the run's time that is gone without it, turn by turn; negative where the run is slower without it.
+        Share of the computing time that the run saves without the effect, for each turn; negative if it takes longer.
     """
 
     effect: str
@@ -46,12 +47,12 @@ class Share:
         return self.time.lowest > 0 or self.time.highest < 0
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Share as a dict for JSON."""
         return {"effect": self.effect, "acted": self.acted, "time": self.time.to_dict(), "is_seen": self.is_seen}
 
 
 def without(scene: physics.Scene, effect) -> physics.Scene:
-    """The scene without one of its effects, and without those that depend on it."""
+    """Scene without one of its effects, and without other effects that depend on it."""
     left = [other for other in scene.effects if other is not effect]
     needs_contact = (physics.Friction, physics.RollingFriction, physics.SpinFriction, physics.Sleeping)
     if isinstance(effect, physics.Contact):
@@ -67,13 +68,27 @@ def without(scene: physics.Scene, effect) -> physics.Scene:
 
 
 def names_of(scene: physics.Scene) -> list[str]:
-    """Names of a scene's effects: their classes, with a number where there are several."""
+    """Names of a scene's effects: their classes, with a number if there are several of one class."""
     kinds = [type(effect).__name__ for effect in scene.effects]
     return [f"{kind} {kinds[:k].count(kind) + 1}" if kinds.count(kind) > 1 else kind for k, kind in enumerate(kinds)]
 
 
 def acted_shares(world: physics.World, others: list[physics.World], steps: int) -> list[float]:
-    """For each of the `others`, share of the steps of `world` that end in another state without the effect."""
+    """Shares of the steps in which effects act.
+
+    Parameters
+    ----------
+    world : World
+        World with all effects, which takes the steps.
+    others : list of World
+        Worlds that lack one effect each; every step is repeated in them from the same state.
+    steps : int
+
+    Returns
+    -------
+    list of float
+        For each of `others`, the share of steps that end in another state.
+    """
     acted = np.zeros(len(others))
     for _ in range(steps):
         before, time = world.state.copy(), world.time
@@ -91,7 +106,7 @@ def acted_shares(world: physics.World, others: list[physics.World], steps: int) 
 
 
 class _Run:
-    """Time of a world's steps from its start, one call each [s]."""
+    """Callable that runs a world's steps from its start, and returns the computing time [s]."""
 
     def __init__(self, world: physics.World, steps: int):
         self.world, self.steps, self.start = world, steps, world.snapshot()
@@ -112,7 +127,9 @@ def measure(
     scene: physics.Scene, duration: float, accuracy: str, repeats: int = REPEATS,
     tick: Callable[[str], None] | None = None,
 ) -> list[Share]:  # fmt: skip
-    """Run a scene for `duration` [s] in steps of `STEP`, whole and without each of its effects.
+    """Run a scene for `duration` [s] in steps of `STEP`, with all effects and without each of them.
+
+    `tick` is called with a name before each run.
 
     Returns
     -------
@@ -144,7 +161,7 @@ def measure(
 
 
 def make_table(shares: list[Share], title: str) -> Table:
-    """Table of effects: share of the steps in which each acted, and share of the time, as median and range."""
+    """Table of effects: share of the steps in which each acted, and share of the time as median and range."""
     table = Table([Column("effect"), *number_columns("acted in", "of the time")], title)
     for share in shares:
         time = f"{share.time.median:.1%}" if share.is_seen else "below noise"

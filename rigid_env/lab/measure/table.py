@@ -1,4 +1,4 @@
-"""Rows of measurements as a table in a terminal."""
+"""Table of measurements for a terminal, and the format of its numbers."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from rich.text import Text
 from rigid_env.lab.measure.timing import Row, Spread
 from rigid_env.terminal import Column, Table, number_columns
 
-SCALES = ((1e6, " M"), (1e3, " k"))  # of large numbers, and the letter of each
+SCALES = ((1e6, " M"), (1e3, " k"))  # factors of large numbers, with their letters
 VERDICTS = {None: Text("-"), True: Text("yes", style="green"), False: Text("no", style="red")}
 
 
 def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "peer")) -> Table:
-    """Table of measurements: both `sides` and their ratio (each as median over range), target, and verdict."""
+    """Table of measurements: both `sides` and their ratio as median and range, target, and whether it is reached."""
     columns = [Column("what"), Column("accuracy", is_whole=True, under="what")]
     columns += [*number_columns(*sides, "ratio", "target"), Column("pass", is_whole=True)]
     table = Table(columns, title)
@@ -22,7 +22,7 @@ def make_table(rows: list[Row], title: str, sides: tuple[str, str] = ("ours", "p
 
 
 def cells(row: Row) -> tuple[Text, ...]:
-    """The columns of `make_table`."""
+    """Cells of one row of `make_table`."""
     ratio = row.ratio
     versus = f"{row.unit}, against {row.peer_name}" if row.peer else row.unit
     return (
@@ -37,19 +37,19 @@ def cells(row: Row) -> tuple[Text, ...]:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Some digits, with k and M for large numbers."""
+    """Text of a number with `digits` significant digits, and k for thousands or M for millions."""
     return number_range(value, value, digits)
 
 
 def number_range(lowest: float, highest: float, digits: int = 3) -> str:
-    """Both numbers as `number` has them, or one if they are the same; a letter stands once, behind the second."""
+    """Text of a range in the format of `number`, or of one number if both are equal; the letter stands at the end."""
     size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
     ends = dict.fromkeys(f"{value / size:.{digits}g}" for value in (lowest, highest))
     return "..".join(ends) + letter
 
 
 def two_lines(spread: Spread, digits: int = 3) -> Text:
-    """The median, and below it lowest and highest sample."""
+    """Text of two lines: the median, and below it the lowest and highest sample."""
     if len(spread.samples) == 1:
         return Text(number(spread.median, digits))
     return _over(number(spread.median, digits), number_range(spread.lowest, spread.highest, digits))

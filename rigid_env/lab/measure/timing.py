@@ -1,4 +1,4 @@
-"""Repeats, medians and ratios: compare two things on a machine that others use, too."""
+"""Repeated measurements in turns, with medians and ratios, for comparisons on a machine with other load."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Spread:
-    """Some repeats of one measurement.
+    """Samples of one measurement that was repeated.
 
     Attributes
     ----------
     samples : tuple of float
-        In the order in which they were measured, in the unit of the row that holds them. A contestant of `interleave`
-        whose measurement is several numbers has samples that hold them all.
+        Measured values in their order, in the unit of the `Row` that contains them. If one measurement is several
+        numbers, a sample is an object with all of them.
     """
 
     samples: tuple[float, ...]
@@ -37,17 +37,17 @@ class Spread:
         return max(self.samples)
 
     def __truediv__(self, other: Spread) -> Spread:
-        """Ratio to another one that was measured in the same turns, turn by turn."""
+        """Ratio to another spread that was measured in the same turns, sample by sample."""
         return Spread(tuple(a / b for a, b in zip(self.samples, other.samples, strict=True)))
 
     def to_dict(self) -> dict:
-        """For JSON: median, min, max and all samples."""
+        """Median, min, max and all samples as a dict for JSON."""
         return {"median": self.median, "min": self.lowest, "max": self.highest, "samples": list(self.samples)}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table of measurements.
+    """One row of a table of measurements.
 
     Attributes
     ----------
@@ -56,21 +56,24 @@ class Row:
     what : str
         Name of the row for people.
     unit : str
-        Of `ours` and `peer`.
+        Unit of `ours` and `peer`.
     ours : Spread
+        Measurement of our engine.
     accuracy : str
-        Preset of our engine, or "" where it plays no part.
+        Preset of our engine, or "" if it does not matter.
     peer_name : str
-        "" without peer.
+        Name of the compared engine; "" without one.
     peer : Spread or None
+        Measurement of the compared engine.
     target : float or None
-        What must be reached: a ratio where `is_ratio`, else an upper limit of `ours`. None: only shown.
+        Least ratio if `is_ratio`, else largest value of `ours`. None: the row has no target.
     is_ratio : bool
-        Whether `target` is a least ratio.
+        Whether `target` is a ratio.
     is_valid : bool
-        Whether what was measured is what the row claims (a residual small enough, say); else it never passes.
+        False if the measured run did not do what the row says, for example with too large a residual; then it never
+        passes.
     notes : dict
-        What else was seen, JSON-able.
+        Further results, for JSON.
     """
 
     key: str
@@ -87,12 +90,12 @@ class Row:
 
     @property
     def ratio(self) -> Spread | None:
-        """Ours over the peer's, repeat by repeat; None without peer."""
+        """Ratio of our measurement to the compared engine's, sample by sample; None without a compared engine."""
         return None if self.peer is None else self.ours / self.peer
 
     @property
     def is_passed(self) -> bool | None:
-        """True if the target is reached; None without a target or a peer."""
+        """True if the target is reached; None without a target, or if a ratio has no compared engine."""
         if self.target is None or (self.is_ratio and self.peer is None):
             return None
         if not self.is_valid:
@@ -100,7 +103,7 @@ class Row:
         return self.ratio.median >= self.target if self.is_ratio else self.ours.median <= self.target
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Row as a dict for JSON."""
         ratio = self.ratio
         return {
             "key": self.key, "what": self.what, "accuracy": self.accuracy, "unit": self.unit,
@@ -117,23 +120,23 @@ def interleave(
     *,
     is_warm: bool = False,
 ) -> dict[str, Spread]:
-    """Measure contestants in turns, A B, B A, ..., so that a disturbance of the machine disturbs them alike.
+    """Measure contestants in turns, A B, B A, ..., so that a disturbance of the machine affects all of them alike.
 
     Parameters
     ----------
-    contestants : dict of callables
-        Each runs once and returns its measurement.
+    contestants : dict of str to callable
+        Functions that run once and return their measurement.
     repeats : int
-        Of each.
+        Repeats of each.
     tick : callable, optional
-        Told a contestant's name before each of its runs.
+        Called with a contestant's name before each of its runs.
     is_warm : bool
-        Whether the first runs count; else all run once before.
+        False: every contestant runs once before, which does not count.
 
     Returns
     -------
-    dict of Spread
-        Under the same names; sample k of all was measured in the same turn.
+    dict of str to Spread
+        Samples by name; sample k of all contestants was measured in the same turn.
     """
     samples: dict[str, list[float]] = {name: [] for name in contestants}
     for turn in range(0 if is_warm else -1, repeats):
@@ -152,9 +155,9 @@ def fastest(spreads: dict[str, Spread], names: Sequence[str]) -> str:
 
 
 class Stopwatch:
-    """Sum of the times of the parts of a run that count.
+    """Timer for parts of a run.
 
-    Use it as ``with watch: ...`` around each part; `seconds` is their sum [s].
+    Use it as ``with watch: ...`` around each part; `seconds` is the sum of their times [s].
     """
 
     def __init__(self):

@@ -1,7 +1,7 @@
-"""Scenes with known outcomes, and the error of a simulation against each, for `rigid-env accuracy`.
+"""Scenes with known outcomes, and the error of a simulation of each, for `rigid-env accuracy`.
 
-The truths are closed forms of the course notes' physics, but for the free rotation, which SciPy's DOP853 integrates
-at two tolerances; their difference is the truth's own error.
+The outcomes are closed forms of the course notes' physics. Only the free rotation is integrated by SciPy's DOP853, at
+two tolerances; their difference is the error of the known outcome itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ INCLINE = math.radians(20.0)
 class Path:
     """Path of one body after each step: t (n,), pos (n, 3), quat (n, 4), linvel (n, 3), angvel (n, 3).
 
-    And, of our own engine, the events between the steps.
+    `events` has the events of our own engine; other engines have none.
     """
 
     t: np.ndarray
@@ -38,33 +38,33 @@ class Path:
 
     @classmethod
     def of(cls, trajectory: physics.Trajectory) -> Path:
-        """Path of the first body of a trajectory."""
+        """Make the path of the first body of a trajectory."""
         columns = ("pos", "quat", "linvel", "angvel")
         return cls(trajectory.t, *(getattr(trajectory, name)[:, 0] for name in columns), trajectory.events)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A scene with a known outcome.
+    """Scene with a known outcome.
 
     Attributes
     ----------
     key, what : str
         Name for programs, and description of the error for people.
     unit : str
-        Of the error.
+        Unit of the error.
     duration : float
-        [s].
+        Simulated time [s].
     scene : callable
         () -> Scene.
     error : callable
         Path -> error.
     goals : tuple of (error, microseconds)
-        To be reached by one setting each: error, and wall-clock time per simulated second.
+        Goals of this project: an error, and a wall-clock time per simulated second; one setting must reach both.
     scale : float, optional
         Size of the motion, in `unit`; an error larger than half of it counts as lost. None: nothing moves.
     own_error : callable
-        () -> error of the truth itself, in `unit`. Rounding of a closed form does not count.
+        () -> error of the known outcome itself, in `unit`. Rounding of a closed form does not count.
     """
 
     key: str
@@ -78,7 +78,7 @@ class Case:
     own_error: Callable[[], float] = float
 
     def truth(self) -> physics.Truth:
-        """Truth for `physics.frontier`."""
+        """Make the truth that `physics.frontier` compares with."""
         own = self.own_error()
         text = "DOP853 at two tolerances" if own else "closed form"
         return physics.Truth(lambda seen: self.error(Path.of(seen)), self.unit, own, self.scale, text)
@@ -89,7 +89,10 @@ class Case:
 
 @cache
 def free_attitude(spin: tuple[float, float, float], duration: float, rtol: float = 1e-13) -> tuple[float, ...]:
-    """Attitude of the block after `duration` [s] of free rotation from (1, 0, 0, 0) with `spin` [rad/s]."""
+    """Attitude of the block after free rotation for `duration` [s], a unit quaternion (w, x, y, z).
+
+    The block starts at (1, 0, 0, 0) with the angular velocity `spin` [rad/s]; `rtol` is DOP853's relative tolerance.
+    """
     x, y, z = scenes.SIZE
     inertia = scenes.MASS / 12.0 * np.array([y * y + z * z, z * z + x * x, x * x + y * y])
 
@@ -114,12 +117,12 @@ def angle_between(q, p) -> float:
 
 
 def truth_error(spin: tuple[float, float, float], duration: float) -> float:
-    """Own error of `free_attitude` [rad], by comparison with a tolerance ten times as large."""
+    """Error of `free_attitude` itself [rad], by comparison with a tolerance ten times as large."""
     return angle_between(free_attitude(spin, duration), free_attitude(spin, duration, 1e-12))
 
 
 def rotation(key: str, spin: tuple[float, float, float], duration: float, goal) -> Case:
-    """The block turning in empty space."""
+    """Case of the block rotating in empty space with the angular velocity `spin` [rad/s]."""
     return Case(
         key, f"free rotation, ω = {spin} rad/s, {duration:g} s: attitude", "rad", duration,
         lambda: physics.Scene([physics.Block(scenes.SIZE, scenes.MASS, angvel=spin)]),
@@ -132,7 +135,7 @@ def rotation(key: str, spin: tuple[float, float, float], duration: float, goal) 
 
 
 def flights(path: Path) -> list[tuple[float, float]]:
-    """Time of each bounce and height of the apex after it [s, m], from the first sample after the bounce."""
+    """Time of each bounce [s] and height of the apex after it [m], from the first sample after the bounce."""
     height, speed = path.pos[:, 1] - scenes.SIZE[1] / 2, path.linvel[:, 1]
     found = []
     for k in np.flatnonzero((speed[1:] > 0.0) & (speed[:-1] <= 0.0)) + 1:
@@ -151,25 +154,27 @@ def elastic_error(path: Path, bounces: int = 10) -> float:
 
 
 def damped_error(path: Path) -> float:
-    """Larger error of the first apex, e² h [m], and of the time to rest, √(2h/g) (1 + e)/(1 - e) [s]."""
+    """Larger one of two errors of a block that falls from h: first apex e² h [m], and time to rest [s].
+
+    The time to rest is √(2h/g) (1 + e)/(1 - e), for the restitution e.
+    """
     found, rest = flights(path), time_of_rest(path)
     if not found:
         return math.inf
     return max(abs(found[0][1] - 0.25), abs(rest - 3.0 * math.sqrt(2.0 / G)))
 
 
-STILL = 1e-9  # speed of a block at rest [m/s]
-RESTLESS = 1e-2  # speed at the end above which a block is not at rest at all [m/s]
+STILL = 1e-9  # speed below which a block is at rest [m/s]
+RESTLESS = 1e-2  # speed near the end of a run above which a block counts as never at rest [m/s]
 
 
 def time_of_rest(path: Path) -> float:
-    """Time at which the block came to rest [s]: that of its event, else of the first sample after which it stays still.
+    """Time at which the block comes to rest [s]; infinite if it never does.
 
-    Infinite where it never does.
-
-    Still is below `STILL`; a soft contact, which never gets there, is still below twice what its speed is in the last
-    tenth of the run, if that is small. Then it may be called at rest too early, by the bounces below that speed v:
-    4 v/g, 0.4 ms for 1 mm/s.
+    It is the time of the engine's event if there is one, else the first sample after which the block stays still. Still
+    means below the speed `STILL`. A soft contact never reaches that; then the limit is twice the largest speed in the
+    last tenth of the run, if that speed is small. The time may then be too early by the bounces below that speed v,
+    which take 4 v/g, 0.4 ms for 1 mm/s.
     """
     told = [event.t for event in path.events if event.kind == "rest"]
     if told:
@@ -183,12 +188,15 @@ def time_of_rest(path: Path) -> float:
 
 
 TILT = (math.cos(0.35), math.sin(0.35) / math.sqrt(2), math.sin(0.35) / math.sqrt(2), 0.0)  # 0.7 rad about (1, 1, 0)
-LANDING_SPEED = 3.0  # of the vertex [m/s]
-LANDING_TIME = 0.16  # [s]
+LANDING_SPEED = 3.0  # speed of the vertex before the impact [m/s]
+LANDING_TIME = 0.16  # time of the impact [s]
 
 
 def lowest_vertex() -> tuple[np.ndarray, np.ndarray]:
-    """Arm of the lowest vertex of the tilted block [m], and its inertia tensor [kg m²], world frame."""
+    """Arm (3,) from the centre of the tilted block to its lowest vertex [m], and its inertia tensor [kg m²].
+
+    Both are in the world frame.
+    """
     w, *v = TILT
     v = np.array(v)
     R = (w * w - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * w * np.cross(np.eye(3), -v)
@@ -199,7 +207,7 @@ def lowest_vertex() -> tuple[np.ndarray, np.ndarray]:
 
 
 def vertex_scene() -> physics.Scene:
-    """Scene of the tilted block, without gravity: its lowest vertex arrives at the floor at `LANDING_TIME`."""
+    """Scene of the tilted block without gravity, whose lowest vertex hits the floor at `LANDING_TIME`."""
     arm, _ = lowest_vertex()
     start = (0.0, LANDING_TIME * LANDING_SPEED - arm[1], 0.0)
     body = physics.Block(scenes.SIZE, scenes.MASS, pos=start, quat=TILT, linvel=(0, -LANDING_SPEED, 0))
@@ -209,8 +217,8 @@ def vertex_scene() -> physics.Scene:
 def vertex_error(path: Path) -> float:
     """Error of the vertex's velocity just after the impact [m/s], from the momentum after it.
 
-    j = (1 + e) v / w with w = 1/m + (r x n)·I⁻¹ (r x n): the vertex then leaves at e v, and an error of j makes one of
-    w times itself in that.
+    The impulse is j = (1 + e) v / w with w = 1/m + (r x n)·I⁻¹ (r x n). Then the vertex leaves at e v, and an error of
+    j changes its velocity by w times this error.
     """
     arm, inertia = lowest_vertex()
     turn = np.cross(arm, (0, 1, 0))
@@ -223,19 +231,22 @@ def vertex_error(path: Path) -> float:
 
 
 def along_incline(path: Path) -> np.ndarray:
-    """Distance down the incline after each step [m]."""
+    """Distance moved down the incline after each step (n,) [m]."""
     down = np.array([math.cos(INCLINE), -math.sin(INCLINE), 0.0])
     return (path.pos - np.array(scenes.incline(INCLINE, 1.0).bodies[0].pos)) @ down
 
 
 def slipping_error(path: Path) -> float:
-    """Error of the distance slid in 10 s, ½ g (sin θ - μ cos θ) t² [m]."""
+    """Error of the distance that the block slides down the incline in 10 s, ½ g (sin θ - μ cos θ) t² [m]."""
     pull = G * (math.sin(INCLINE) - 0.99 * math.tan(INCLINE) * math.cos(INCLINE))
     return abs(along_incline(path)[-1] - 0.5 * pull * 100.0)
 
 
 def sphere_error(path: Path) -> float:
-    """Larger error of the sphere's final speed, 5/7 v [m/s], and distance [m]; it slips until t = 2 v/(7 μ g)."""
+    """Larger one of two errors: of the sphere's final speed, 5/7 v [m/s], and of its distance [m].
+
+    The sphere slips until t = 2 v/(7 μ g).
+    """
     v, mu = 5.0, 0.2
     slip = 2.0 * v / (7.0 * mu * G)
     way = v * slip - 0.5 * mu * G * slip**2 + 5.0 / 7.0 * v * (path.t[-1] - slip)

@@ -1,4 +1,4 @@
-"""Workloads of our engine: a call of one does the work once and returns steps per second.
+"""Workloads of our engine as callables: each call does the work once and returns steps per second.
 
 `mujoco_scene` has the same work under the same names for MuJoCo.
 """
@@ -13,19 +13,19 @@ import physics
 from physics import scenes
 from rigid_env.lab.measure.timing import Stopwatch
 
-STEP = 0.005  # of both engines [s]
+STEP = 0.005  # step of both engines [s]
 HOLD = 25  # steps that a shove lasts
-FLIGHT_STEPS = 2000  # of one flight: in longer ones MuJoCo's Euler integrator gains too much energy
-FORCE = 0.9 * scenes.MASS * scenes.GRAVITY  # per axis, at most: the block cannot fly [N]
-TORQUE = 60.0  # per axis, at most [N m]
-DROP_HEIGHTS = (3.2, 5.0)  # of the block's centre in the batch; its corners are 3.08 m from there [m]
+FLIGHT_STEPS = 2000  # steps of one flight; in longer ones MuJoCo's Euler integrator gains too much energy
+FORCE = 0.9 * scenes.MASS * scenes.GRAVITY  # largest force along each axis, with which the block cannot fly [N]
+TORQUE = 60.0  # largest torque about each axis [N m]
+DROP_HEIGHTS = (3.2, 5.0)  # range of heights of the blocks' centres in the batch; corners are 3.08 m from them [m]
 DROP_WIDTH = 6.0  # the batch's blocks start at |x| and |z| below this [m]
-LANDING_STEPS = 400  # before the batch is timed: two seconds
+LANDING_STEPS = 400  # steps before the batch is timed: two seconds
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Work of one run.
+    """Size of the work in one run.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Sizes:
     shoves : int
         Random wrenches, held for `HOLD` steps each.
     worlds, batch_steps, threads : int
-        Of the batch.
+        Worlds, steps and threads of the batch.
     """
 
     flights: int = 20
@@ -52,13 +52,13 @@ QUICK = Sizes(flights=1, rest_steps=1000, shoves=20, worlds=32, batch_steps=5)
 
 
 def random_wrenches(count: int, worlds: int = 1, seed: int = 2) -> np.ndarray:
-    """Wrenches (count, worlds, 1, 6), uniform in the box of `FORCE` and `TORQUE` per axis."""
+    """Draw wrenches (count, worlds, 1, 6) [N, N m], uniform up to `FORCE` and `TORQUE` along each axis."""
     limits = np.array([FORCE] * 3 + [TORQUE] * 3)
     return np.random.default_rng(seed).uniform(-limits, limits, (count, worlds, 1, 6))
 
 
 def random_poses(worlds: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (worlds, 1, 3) [m] above the floor and uniform unit quaternions (worlds, 1, 4)."""
+    """Draw positions (worlds, 1, 3) [m] above the floor, and uniform unit quaternions (worlds, 1, 4)."""
     rng = np.random.default_rng(seed)
     pos = rng.uniform(-DROP_WIDTH, DROP_WIDTH, (worlds, 1, 3))
     pos[:, :, 1] = rng.uniform(*DROP_HEIGHTS, (worlds, 1))
@@ -67,7 +67,7 @@ def random_poses(worlds: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Flight:
-    """The block tumbling freely high above the floor, `FLIGHT_STEPS` steps at a time."""
+    """Work of the block in free flight: it tumbles high above the floor, `FLIGHT_STEPS` steps at a time."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(scenes.flight(), dt=STEP, accuracy=accuracy)
@@ -83,7 +83,7 @@ class Flight:
 
 
 class Rest:
-    """The block at rest face down: four contacts."""
+    """Work of the block at rest on a face, with four contacts."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(scenes.rest(), dt=STEP, accuracy=accuracy)
@@ -96,7 +96,7 @@ class Rest:
         return self.steps / watch.seconds
 
     def notes(self) -> dict:
-        """Contacts, their total force over the weight, and the last run's residual and solver."""
+        """Number of contacts, their total force over the weight, and residual, solver and status of the last run."""
         points, forces = self.world.contacts()
         return {
             "contacts": len(points),
@@ -108,7 +108,7 @@ class Rest:
 
 
 class Shove:
-    """The block shoved about by random wrenches, each held for `HOLD` steps; every run starts the same."""
+    """Work of the block under random wrenches, each held for `HOLD` steps; every run starts from the same state."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(scenes.shove(), dt=STEP, accuracy=accuracy)
@@ -124,7 +124,10 @@ class Shove:
         return len(self.wrenches) * HOLD / watch.seconds
 
     def notes(self) -> dict:
-        """Share of shoves that end in contact, share of steps not converged, over one more run."""
+        """Shares of wrenches after which the block touches a wall, and of steps not converged, with worst residual.
+
+        They are measured in a further run.
+        """
         self.world.restore(self.start)
         touching, unconverged, worst = 0, 0, 0.0
         for wrench in self.wrenches:
@@ -141,7 +144,7 @@ class Shove:
 
 
 class Batch:
-    """Many blocks that have fallen from random poses; every step each gets a fresh random wrench."""
+    """Work of many blocks that have fallen from random poses; each gets a new random wrench in every step."""
 
     def __init__(self, accuracy, sizes: Sizes = FULL):
         self.world = physics.World(

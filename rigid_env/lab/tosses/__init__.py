@@ -1,1 +1,1 @@
-"""Validation on reality: measured tosses of a cube, replayed by the engine (``rigid-env tosses``)."""
+"""Validation by experiment: measured tosses of a cube, replayed by the engine (``rigid-env tosses``)."""

@@ -1,4 +1,4 @@
-"""Measured cube tosses: read them, and split them into a part for the fit and the rest.
+"""Measured cube tosses: read them from files, and split them into tosses for the fit and the rest.
 
 Two formats are read. Both are of the public ContactNets data set (Pfrommer, Halm and Posa, *ContactNets: Learning
 Discontinuous Contact Dynamics with Smooth, Implicit Representations*, CoRL 2020):
@@ -9,7 +9,7 @@ Discontinuous Contact Dynamics with Smooth, Implicit Representations*, CoRL 2020
   position (3), quaternion (4), velocity (3), angular velocity (3) and control (6, not used), with lengths in
   half-widths of the cube, `HALF_WIDTH`.
 
-In both z is up, the table is z = 0, the quaternion is (w, x, y, z) from body to world, and the angular velocity is in
+In both, z is up, the table is z = 0, the quaternion is (w, x, y, z) from body to world, and the angular velocity is in
 the body frame.
 """
 
@@ -25,17 +25,17 @@ import numpy as np
 from rigid_env.extras import require
 
 SAMPLE_DT = 1.0 / 148.0  # [s]
-HALF_WIDTH = 0.0524  # of the cube [m]
-SIDE = 2.0 * HALF_WIDTH  # nominal [m]
+HALF_WIDTH = 0.0524  # half the cube's edge [m]
+SIDE = 2.0 * HALF_WIDTH  # nominal edge of the cube [m]
 MASS = 0.37  # [kg]
-INERTIA = 0.00081  # about every axis, nominal [kg m²]
+INERTIA = 0.00081  # nominal moment of inertia about every axis [kg m²]
 GRAVITY = 9.81  # [m/s²]
 
 STATE_SIZE = 13
 POS, QUAT, LINVEL, ANGVEL = slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13)
 FILE_SIZE = 19  # columns of the data set's own files
 
-# A quaternion may be this far from unit length: files hold single precision, or rounded numbers.
+# Largest deviation of a quaternion from unit length; files have single precision, or rounded numbers.
 UNIT_ERROR = 1e-3
 
 TRAINING_SHARE = 0.25
@@ -44,7 +44,7 @@ SPLIT_SEED = 0
 
 @dataclass(frozen=True)
 class Tosses:
-    """Measured tosses, one after the other.
+    """Measured tosses, one after the other in one array.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class Tosses:
     offsets : (tosses + 1,) int64
         Toss i is ``states[offsets[i]:offsets[i + 1]]``.
     numbers : (tosses,) int64
-        Of the tosses in the public data set.
+        Numbers of the tosses in the public data set.
     source : str
-        Where they were read from.
+        Path that they were read from.
     """
 
     states: np.ndarray
@@ -72,34 +72,36 @@ class Tosses:
 
     @property
     def lengths(self) -> np.ndarray:
-        """(tosses,) int64, frames of each."""
+        """Number of frames (tosses,) int64 of each toss."""
         return np.diff(self.offsets)
 
     @property
     def first(self) -> np.ndarray:
-        """(tosses, 13) float64, the first frame of each."""
+        """First frame (tosses, 13) float64 of each toss."""
         return self.states[self.offsets[:-1]]
 
     @property
     def duration(self) -> float:
-        """Duration of all tosses together [s]."""
+        """Total duration of all tosses [s]."""
         return float((self.lengths - 1).sum() * SAMPLE_DT)
 
     def subset(self, chosen) -> Tosses:
-        """The tosses with these indices, in this order."""
+        """Tosses with these indices, in this order."""
         chosen = np.asarray(chosen, dtype=np.int64)
         parts = [self.states[self.offsets[i] : self.offsets[i + 1]] for i in chosen]
         return join(parts, self.numbers[chosen], self.source)
 
 
 def join(parts: list[np.ndarray], numbers, source: str = "") -> Tosses:
-    """`Tosses` from one (frames, 13) array each."""
+    """Make `Tosses` from one array (frames, 13) for each toss, and their numbers."""
     offsets = np.concatenate(([0], np.cumsum([len(part) for part in parts]))).astype(np.int64)
     return Tosses(np.concatenate(parts), offsets, np.asarray(numbers, dtype=np.int64), source)
 
 
 def split(count: int, seed: int = SPLIT_SEED, share: float = TRAINING_SHARE) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of the tosses to fit, and of the rest, both sorted: the first ``share * count`` of a seeded permutation.
+    """Split `count` tosses: sorted indices of the tosses to fit, and of the rest.
+
+    The tosses to fit are the first ``share * count`` of a random permutation with this seed.
 
     Raises
     ------
@@ -114,7 +116,7 @@ def split(count: int, seed: int = SPLIT_SEED, share: float = TRAINING_SHARE) -> 
 
 
 def load(path: str | Path) -> Tosses:
-    """Read tosses from a ``.npz`` or from a folder of ``<number>.pt`` (see the module).
+    """Read tosses from a ``.npz`` file or from a folder of ``<number>.pt`` files, whose formats the module describes.
 
     Raises
     ------
@@ -174,10 +176,10 @@ def _torch():
 
 
 def _read_pt(file: Path, torch) -> np.ndarray:
-    """One toss in SI units, (frames, 13)."""
+    """Read one toss from a ``.pt`` file, converted to SI units: (frames, 13)."""
     try:
         tensor = torch.load(file, map_location="cpu", weights_only=True)
-    except Exception as error:  # whatever the unpickler meets
+    except Exception as error:  # the unpickler can raise any error
         raise ValueError(f"{file} cannot be read as a torch tensor: {error}") from error
     if not isinstance(tensor, torch.Tensor):
         raise ValueError(f"{file} holds a {type(tensor).__name__}; allowed is a tensor of shape (frames, {FILE_SIZE})")
@@ -193,7 +195,7 @@ def _read_pt(file: Path, torch) -> np.ndarray:
 
 
 def _checked_states(states: np.ndarray, field: str) -> np.ndarray:
-    """(frames, 13) float64 with unit quaternions."""
+    """Check states (frames, 13), and return them as float64 with unit quaternions; `field` names them in an error."""
     if states.ndim != 2 or states.shape[1] != STATE_SIZE or not np.issubdtype(states.dtype, np.number):
         raise ValueError(f"{field} has shape {states.shape}; allowed are numbers of shape (frames, {STATE_SIZE})")
     states = states.astype(np.float64)

@@ -1,11 +1,11 @@
-"""Fit the cube's parameters to measured tosses, one set of parameters for all.
+"""Fit the cube's parameters to measured tosses, one set of parameters for all tosses.
 
 The fit minimises the mean over tosses and frames of the position error in cube widths plus half the rotation error in
-radians: a turn by θ moves the middle of a face by θ/2 cube widths. Which face a cube lands on hangs on a hair in some
-tosses, so that this mean jumps with the parameters; it is therefore averaged over the start as measured and some starts
-disturbed by the measurement's noise (`flight.disturb`), the same ones in every evaluation.
+radians: a rotation by θ moves the middle of a face by θ/2 cube widths. In some tosses a tiny change decides on which
+face the cube lands, so this mean jumps with the parameters. Therefore it is averaged over the measured start and some
+starts disturbed by the measurement's noise (`flight.disturb`), which are the same in every evaluation.
 
-The search: points drawn in the box of the parameters, then Nelder and Mead's simplex from the best of them.
+The search draws points in the box of the parameters, then runs Nelder and Mead's simplex from the best of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rigid_env.lab.tosses.flight import Flight, disturb
 from rigid_env.lab.tosses.metric import Errors, compare
 from rigid_env.lab.tosses.replay import Cube, Recording, Starts, replay, starts
 
-# Where each parameter is searched.
+# Range in which each parameter is searched.
 BOUNDS = {
     "friction": (0.05, 0.4),
     "restitution": (0.0, 0.6),
@@ -37,12 +37,12 @@ BOUNDS = {
 NOMINAL = Cube()
 
 REFINED = 3  # points from which the simplex starts
-FIRST_SIMPLEX = 0.08  # its first edges, in widths of the box
+FIRST_SIMPLEX = 0.08  # edges of the first simplex, in widths of the box
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Effort of a search.
+    """Number of evaluations in a search.
 
     Parameters
     ----------
@@ -51,8 +51,9 @@ class Effort:
     refining : int
         Evaluations of each simplex, per parameter.
     disturbed : int
-        Disturbed starts per toss, beside the measured one.
+        Disturbed starts per toss, in addition to the measured one.
     seed : int
+        Seed of the drawn points and of the disturbances.
     """
 
     drawn: int = 60
@@ -61,7 +62,7 @@ class Effort:
     seed: int = 1
 
     def evaluations(self, parameters: int) -> int:
-        """Largest number of evaluations for so many parameters."""
+        """Largest number of evaluations for this number of parameters."""
         return parameters * (self.drawn + REFINED * self.refining)
 
 
@@ -70,18 +71,20 @@ QUICK = Effort(drawn=2, refining=1, disturbed=0)
 
 @dataclass(frozen=True)
 class Fit:
-    """The best parameters found.
+    """Result of a fit.
 
     Attributes
     ----------
     cube : Cube
+        Best parameters.
     names : tuple of str
-        Of the parameters that were fitted; the others have their nominal values, or those the fit was given.
+        Parameters that were fitted; the others were given.
     objective : float
-        See the module [cube widths].
+        Mean error that the fit minimises, see the module [cube widths].
     evaluations : int
+        Number of evaluations of the objective.
     is_complete : bool
-        False: interrupted; `cube` is the best until then.
+        False if the search was interrupted; `cube` is the best until then.
     """
 
     cube: Cube
@@ -91,7 +94,7 @@ class Fit:
     is_complete: bool
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Result as a dict for JSON."""
         return {
             "parameters": vars(self.cube), "fitted": list(self.names), "objective": self.objective,
             "evaluations": self.evaluations, "is_complete": self.is_complete,
@@ -99,7 +102,7 @@ class Fit:
 
 
 def check_names(names) -> tuple[str, ...]:
-    """Names of parameters to fit, each once.
+    """Check names of parameters to fit, and return them as a tuple.
 
     Raises
     ------
@@ -124,12 +127,14 @@ class Objective:
     Parameters
     ----------
     tosses : Tosses
-        Those to fit, and no others.
+        Tosses to fit, and no others.
     recording : Recording
+        Measurement model of their recorded numbers.
     flight : Flight
-        Measured from the same tosses.
+        Noise that was measured from the same tosses.
     effort : Effort
     accuracy : str
+        Preset of the replays.
     threads : int
     """
 
@@ -142,7 +147,7 @@ class Objective:
         self._offsets = np.concatenate(([0], np.cumsum(self._lengths)))
 
     def __call__(self, cube: Cube) -> float:
-        """Mean error [cube widths]."""
+        """Mean error of the replays with these parameters [cube widths]."""
         poses, _ = replay(self._lengths, self._starts(cube), cube, self.accuracy, self.threads)
         return mean_error(compare(self._measured, poses, self._offsets))
 
@@ -154,7 +159,7 @@ class Objective:
 
 
 class _Search:
-    """Evaluates points of the unit box and remembers the best."""
+    """Function of a point in the unit box that evaluates the objective there, and remembers the best point."""
 
     def __init__(self, objective: Callable[[Cube], float], names: tuple[str, ...], tick: Callable[[float], None],
                  nominal: Cube):  # fmt: skip
@@ -173,7 +178,7 @@ class _Search:
         return found
 
     def run(self, effort: Effort) -> None:
-        """Draw points at random, then refine the best."""
+        """Evaluate random points, then refine the best ones by the simplex method."""
         size = len(self.names)
         points = np.random.default_rng(effort.seed).random((size * effort.drawn, size))
         order = np.argsort([self(point) for point in points], kind="stable")
@@ -190,12 +195,11 @@ def fit(
     tick: Callable[[float], None] = lambda best: None,
     nominal: Cube = NOMINAL,
 ) -> Fit:
-    """Search the parameters `names` with the least `objective`; ``tick`` gets the best so far after each evaluation.
+    """Search the parameters `names` for which `objective` is smallest; other parameters are those of `nominal`.
 
-    Other parameters are those of `nominal`.
-
-    Ctrl-C ends the search; the best so far is returned, marked as incomplete. Before the end of the first evaluation
-    there is no result, and the interrupt is raised.
+    ``tick`` is called with the best value so far after each evaluation. Ctrl-C ends the search; the best result so far
+    is returned, marked as incomplete. Before the end of the first evaluation there is no result, and the interrupt is
+    raised.
     """
     search = _Search(objective, check_names(names), tick, nominal)
     is_complete = True

@@ -1,8 +1,8 @@
-"""First flights of the tosses, before any contact: they measure gravity, noise and the cube.
+"""Free flights at the start of the tosses, before any contact: they measure gravity, noise and the centre of mass.
 
-In flight the centre of mass follows a parabola and nothing of the contact model acts. So the first flights of the
-tosses to fit give the scale of the recorded lengths, the noise of the first frame (how far its velocities are from
-those of the whole flight), and how far the tracked point is from the centre of mass.
+In flight the centre of mass follows a parabola, and the contact model has no effect. So these flights give the scale of
+the recorded lengths, and the noise of the first frame: the difference between its velocities and those of the whole
+flight. They also give the position of the centre of mass relative to the tracked point.
 """
 
 from __future__ import annotations
@@ -15,31 +15,31 @@ from rigid_env.lab.tosses import data
 from rigid_env.lab.tosses.data import SAMPLE_DT, Tosses
 from rigid_env.lab.tosses.replay import Starts, attitude, corner_height
 
-# A flight ends when the lowest corner of the nominal cube is this near to the table [m]: further than a frame's
-# measurement is off, nearer than what a frame of fall takes (8 mm at 1.2 m/s).
+# Height of the nominal cube's lowest corner at which a flight ends [m]. It is more than the error of a measurement, and
+# less than the cube falls in one frame (8 mm at 1.2 m/s).
 CLEARANCE = 0.005
-LEAST_FRAMES = 8  # of a flight that says something about velocities
-REST_SHARE = 0.05  # of the last frames of a toss, in which it is at rest
+LEAST_FRAMES = 8  # least frames of a flight from which velocities are measured
+REST_SHARE = 0.05  # share of a toss, at its end, in which the cube is at rest
 
 
 @dataclass(frozen=True)
 class Flight:
-    """Quantities measured from the flights.
+    """Quantities measured from the free flights.
 
     Attributes
     ----------
     flights : int
-        How many were long enough.
+        Number of flights that were long enough.
     gravity : float
-        In recorded lengths [m/s²].
+        Gravity in recorded lengths [m/s²].
     center_of_mass : tuple of 3 floats
-        Of the cube relative to the tracked point, body frame, recorded lengths [m].
+        Centre of mass of the cube relative to the tracked point, body frame, recorded lengths [m].
     residual : float
-        Standard deviation of the positions from these parabolas [m].
+        Standard deviation of the positions from the fitted parabolas [m].
     linvel_noise, angvel_noise : tuple of 3 floats
         Standard deviation of a first frame's velocity from that of the whole flight [m/s, rad/s], world frame.
     linvel_bias : tuple of 3 floats
-        Mean of the same [m/s]; a backward difference is half a frame of gravity off, 0.033 m/s upwards.
+        Mean of the same difference [m/s]; a backward difference is off by half a frame of gravity, 0.033 m/s upwards.
     """
 
     flights: int
@@ -51,7 +51,7 @@ class Flight:
     linvel_bias: tuple[float, ...]
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Quantities as a dict for JSON."""
         return asdict(self)
 
 
@@ -62,22 +62,22 @@ def rest_scale(tosses: Tosses) -> float:
 
 
 def first_flight(toss: np.ndarray) -> np.ndarray:
-    """The frames (n, 13) of a toss before its lowest corner first comes near the table."""
+    """Frames (n, 13) of a toss before its lowest corner first comes near the table."""
     low = toss[:, 2] - corner_height(toss[:, data.QUAT], data.SIDE)
     near = np.flatnonzero(low < CLEARANCE)
     return toss[: near[0]] if len(near) else toss
 
 
 def measure_flight(tosses: Tosses) -> Flight:
-    """Measure gravity, noise and drift in the first flights.
+    """Measure gravity, centre of mass, noise and bias in the first flights.
 
-    Position = c + v t + g t²/2 + R(q) s, least squares over all flights for c and v of each and g and s of all: the
-    tracked point is at s from the centre of mass.
+    The model is position = c + v t + g t²/2 + R(q) s, by least squares over all flights: each flight has its own c and
+    v, and all share g and s, the vector from the centre of mass to the tracked point.
 
     Raises
     ------
     ValueError
-        No toss with a flight of `LEAST_FRAMES`.
+        No toss has a flight of `LEAST_FRAMES`.
     """
     flights = [flight for flight in map(first_flight, tosses) if len(flight) >= LEAST_FRAMES]
     if not flights:
@@ -99,7 +99,11 @@ def _times(flight: np.ndarray) -> np.ndarray:
 
 
 def _equations(flight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (3 n, 4) for (s, g) and right sides (3 n,) of one flight, with its own c and v projected out."""
+    """Linear equations of one flight of n frames: matrix (3 n, 4) and right sides (3 n,).
+
+    The unknowns are those of `measure_flight` that all flights share: the vector s and the strength of gravity. The
+    flight's own start c and velocity v are eliminated.
+    """
     t, R = _times(flight), attitude(flight[:, data.QUAT]).as_matrix()
     basis, _ = np.linalg.qr(np.stack([np.ones_like(t), t], axis=1))
     rows = np.zeros((3, len(t), 4))
@@ -111,7 +115,7 @@ def _equations(flight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _velocity_errors(flight: np.ndarray, gravity: float, offset: np.ndarray) -> np.ndarray:
-    """Velocity and angular velocity (6,) of the first frame minus those of the whole flight, world frame."""
+    """Velocity and angular velocity (6,) of a flight's first frame minus those of the whole flight, world frame."""
     t, R = _times(flight), attitude(flight[:, data.QUAT])
     spin = ((R[1:] * R[:-1].inv()).as_rotvec() / SAMPLE_DT).mean(axis=0)
     center = flight[:, data.POS] - R.apply(offset)
@@ -121,7 +125,7 @@ def _velocity_errors(flight: np.ndarray, gravity: float, offset: np.ndarray) -> 
 
 
 def disturb(begin: Starts, flight: Flight, rng: np.random.Generator) -> Starts:
-    """Starts with velocities changed by normal random numbers of the measurement's noise."""
+    """Add normal random numbers with the measurement's noise to the velocities of starts."""
     linvel = begin.linvel + rng.normal(size=begin.linvel.shape) * flight.linvel_noise
     angvel = begin.angvel + rng.normal(size=begin.angvel.shape) * flight.angvel_noise
     return Starts(begin.pos, begin.quat, linvel, angvel)

@@ -1,4 +1,4 @@
-"""Sources of error of replayed tosses: the start's noise, the face they land on, and growth over time."""
+"""Limits of the accuracy of replayed tosses: noise of the start, the face they land on, and growth over time."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ ALONG_PARTS = 20
 
 @dataclass(frozen=True)
 class Limits:
-    """Sources of the headline's error, over the tosses outside the fit.
+    """Sources of the error of the main fit, over the tosses that were not fitted.
 
     Attributes
     ----------
     noise : Summary
-        How far replays from starts disturbed by the measurement's noise are from the undisturbed replay: no engine can
-        be expected to be nearer to the measurement than this.
+        Distance of replays with disturbed starts from the undisturbed replay. The disturbance is the measurement's
+        noise, so no engine can be expected to be nearer to the measurement.
     landed, missed : Summary or None
         Errors of the tosses that end on the measured face, and of the others; None if there are none.
     along_position, along_rotation : (ALONG_PARTS,) float64
-        Mean error against the share of the toss that is over [cube widths, deg].
+        Mean error in each of equal parts of a toss's duration [cube widths, deg].
     """
 
     noise: Summary
@@ -36,7 +36,7 @@ class Limits:
     along_rotation: np.ndarray
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Limits as a dict for JSON."""
         return {
             "noise_floor": self.noise.to_dict(),
             "landed_on_the_measured_face": self.landed and self.landed.to_dict(),
@@ -46,7 +46,7 @@ class Limits:
 
 
 def faces_down(quat: np.ndarray) -> np.ndarray:
-    """(n,) which of the six faces of a cube points down most: body axis 0 to 2, plus 3 for its + side."""
+    """Face (n,) of a cube that points down most, for each attitude: body axis 0 to 2, plus 3 for its positive side."""
     down = -attitude(quat).as_matrix()[:, 2]
     axis = np.abs(down).argmax(axis=1)
     return axis + 3 * (np.take_along_axis(down, axis[:, None], axis=1)[:, 0] > 0.0)
@@ -55,19 +55,19 @@ def faces_down(quat: np.ndarray) -> np.ndarray:
 def find_limits(
     tosses: Tosses, chosen: np.ndarray, errors: Errors, poses: np.ndarray, disturbed: list[Errors]
 ) -> Limits:
-    """Limits over the chosen tosses.
+    """Find the limits for the chosen tosses.
 
     Parameters
     ----------
     tosses : Tosses
     chosen : (k,) int
-        Indices.
+        Indices of the tosses.
     errors : Errors
-        Of all tosses.
+        Errors of the replay of all tosses.
     poses : (frames, 7) float64
-        Of their replay.
+        Poses of this replay.
     disturbed : list of Errors
-        Of replays from disturbed starts, against `poses`.
+        Differences between replays from disturbed starts and `poses`.
     """
     ends = tosses.offsets[1:] - 1
     is_same = faces_down(poses[ends, 3:]) == faces_down(tosses.states[ends, data.QUAT])

@@ -1,7 +1,8 @@
 """Distance of a replayed toss from the measured one.
 
-Per frame: the distance of the positions in cube widths, and the geodesic angle between the orientations in degrees.
-Per toss: the mean over its frames, the first (where both agree) included. Of many tosses: mean and median of these.
+For a frame it is the distance of the positions in cube widths, and the angle of the rotation between the attitudes in
+degrees. For a toss it is the mean over its frames, the first (where both agree) included. For several tosses it is the
+mean and the median of these means.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from rigid_env.lab.tosses.data import SIDE
 
 @dataclass(frozen=True)
 class Summary:
-    """Errors of some tosses.
+    """Errors of several tosses as means and medians.
 
     Attributes
     ----------
     tosses : int
+        Number of tosses.
     position_mean, position_median : float
         [cube widths].
     rotation_mean, rotation_median : float
@@ -41,13 +43,13 @@ class Summary:
         )  # fmt: skip
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Summary as a dict for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Errors of some tosses, frame by frame.
+    """Errors of several tosses, frame by frame.
 
     Attributes
     ----------
@@ -56,7 +58,7 @@ class Errors:
     rotation : (frames,) float64
         [deg].
     offsets : (tosses + 1,) int64
-        Where each toss begins and ends.
+        Toss i has the frames from ``offsets[i]`` to ``offsets[i + 1] - 1``.
     """
 
     position: np.ndarray
@@ -64,24 +66,24 @@ class Errors:
     offsets: np.ndarray
 
     def per_toss(self) -> tuple[np.ndarray, np.ndarray]:
-        """Mean over frames, (tosses,) each: position [cube widths] and rotation [deg]."""
+        """Means over the frames of each toss, (tosses,) each: position [cube widths] and rotation [deg]."""
         frames = np.diff(self.offsets)
         return tuple(np.add.reduceat(values, self.offsets[:-1]) / frames for values in (self.position, self.rotation))
 
     def summary(self, chosen=slice(None)) -> Summary:
-        """Mean and median over tosses, or over the `chosen` ones."""
+        """Mean and median over all tosses, or over the tosses with the indices `chosen`."""
         return Summary.of(*(values[chosen] for values in self.per_toss()))
 
     def subset(self, chosen) -> Errors:
-        """The errors of the tosses with these indices."""
+        """Errors of the tosses with these indices."""
         frames = np.concatenate([np.arange(self.offsets[i], self.offsets[i + 1]) for i in chosen])
         offsets = np.concatenate(([0], np.cumsum(np.diff(self.offsets)[chosen])))
         return Errors(self.position[frames], self.rotation[frames], offsets)
 
     def along(self, parts: int) -> tuple[np.ndarray, np.ndarray]:
-        """Mean errors (parts,) over a toss cut into `parts` equal shares of its time.
+        """Mean errors (parts,) of position [cube widths] and rotation [deg] in equal parts of a toss's duration.
 
-        Each share of a toss counts by the mean of its frames, so that long tosses weigh as much as short ones.
+        The mean of each toss in a part counts once, so that long tosses have the same weight as short ones.
         """
         frames = np.diff(self.offsets)
         index = np.arange(len(self.position)) - np.repeat(self.offsets[:-1], frames)
@@ -97,10 +99,10 @@ class Errors:
 
 
 def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Geodesic angle (...) [deg] between the attitudes of unit quaternions (..., 4).
+    """Angle (...) of the rotation between the attitudes of unit quaternions (..., 4) [deg].
 
-    With d = a⁻¹b it is 2 atan2(|vector part of d|, |scalar part of d|), which is accurate at 0 and at 180 degrees,
-    where the arc cosine of a·b is not.
+    With d = a⁻¹b it is 2 atan2(|vector part of d|, |scalar part of d|). This is accurate at 0 and at 180 degrees, where
+    the arc cosine of a·b is not.
     """
     scalar = np.abs((a * b).sum(axis=-1))
     cross = a[..., :1] * b[..., 1:] - b[..., :1] * a[..., 1:] - np.cross(a[..., 1:], b[..., 1:])
@@ -113,8 +115,9 @@ def compare(measured: np.ndarray, replayed: np.ndarray, offsets: np.ndarray) -> 
     Parameters
     ----------
     measured, replayed : (frames, 7 or more) float64
-        Position [m] and unit quaternion (w, x, y, z), in the same lengths.
+        Position [m] and unit quaternion (w, x, y, z), both with true or both with recorded lengths.
     offsets : (tosses + 1,) int64
+        First frame of each toss, and the end.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The report as a picture (matplotlib, in the extra ``agents``)."""
+"""Plot of the report on tosses (with matplotlib, in the extra ``agents``)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ DPI = 120
 
 
 def write_plot(path: Path, report: Report) -> None:
-    """Above: error against time at each accuracy; below: error along the toss. Left position, right rotation."""
+    """Draw a report into a file: four panels, position on the left and rotation on the right.
+
+    The upper panels show error against computing time at each accuracy, the lower ones error along the toss.
+    """
     figure = make_figure(*SIZE)
     axes = figure.subplots(2, 2)
     for column, (name, unit) in enumerate((("position", "cube widths"), ("rotation", "deg"))):

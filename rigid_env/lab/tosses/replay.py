@@ -1,4 +1,4 @@
-"""Replaying measured tosses: each from its first frame, with the same physical parameters for all."""
+"""Replay measured tosses: each from its first frame, with the same physical parameters for all."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from physics.annotations import Preset
 from rigid_env.lab.tosses import data
 from rigid_env.lab.tosses.data import SAMPLE_DT, Tosses
 
-# Tosses are simulated in batches of about this many, of similar length: a batch runs until its longest toss ends.
+# Number of tosses in a batch. They have similar lengths, since a batch runs until its longest toss ends.
 BATCH = 50
 
 
 @dataclass(frozen=True)
 class Cube:
-    """Physical parameters, the same for every toss.
+    """Physical parameters of the cube and the table, the same for every toss.
 
     Parameters
     ----------
     friction, restitution : float
         Coefficients.
     side : float
-        [m].
+        Edge of the cube [m].
     inertia : float
-        Moment of inertia about every axis, at the nominal mass [kg m²]. Only their ratio acts.
+        Moment of inertia about every axis, at the nominal mass [kg m²]. Only the ratio to the mass has an effect.
     gravity : float
         [m/s²].
     table : float
         Height of the table [m].
     heavy_x, heavy_y, heavy_z : float
-        Centre of mass from the cube's centre, which is tracked, body frame [m].
+        Centre of mass relative to the cube's centre, which is tracked, body frame [m].
     """
 
     friction: float = 0.18
@@ -54,7 +54,7 @@ class Cube:
         return np.array([self.heavy_x, self.heavy_y, self.heavy_z])
 
     def scene(self) -> physics.Scene:
-        """The cube over the table; z is up."""
+        """Scene of the cube above the table; z is up."""
         body = physics.Block(
             size=(self.side,) * 3, mass=data.MASS, pos=(0.0, 0.0, self.table + self.side),
             center=-self.center_of_mass, inertia_body=(self.inertia,) * 3,
@@ -76,15 +76,15 @@ class Recording:
     length_scale : float
         True length per recorded length; 1 takes the recording as it is.
     is_midframe : bool
-        Whether the velocity of a frame, a backward difference, is taken for that of half a frame earlier, and gravity
-        acts on it for that half frame. If not, it is taken for the velocity at the frame.
+        True: the velocity of a frame, a backward difference, is that of half a frame earlier, and gravity acts for this
+        half frame. False: it is the velocity at the frame.
     """
 
     length_scale: float = 1.0
     is_midframe: bool = False
 
     def lengths(self, states: np.ndarray) -> np.ndarray:
-        """Recorded states (frames, 13) converted to true lengths."""
+        """Convert recorded states (frames, 13) to true lengths."""
         scaled = states.copy()
         scaled[:, data.POS] *= self.length_scale
         scaled[:, data.LINVEL] *= self.length_scale
@@ -93,7 +93,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Starts:
-    """States to simulate from, world frame.
+    """States from which tosses are simulated, world frame.
 
     Attributes
     ----------
@@ -108,17 +108,17 @@ class Starts:
 
 
 def attitude(quat: np.ndarray) -> Rotation:
-    """SciPy's rotations from quaternions (n, 4), scalar first."""
+    """Convert quaternions (n, 4), w first, to rotations of SciPy."""
     return Rotation.from_quat(np.roll(quat, -1, axis=-1))
 
 
 def corner_height(quat: np.ndarray, side: float) -> np.ndarray:
-    """Depth (n,) of the lowest corner of a cube below its centre, z up [m]."""
+    """Vertical distance (n,) of a cube's lowest corner below its centre [m], for attitudes (n, 4); z is up."""
     return 0.5 * side * np.abs(attitude(quat).as_matrix()[:, 2]).sum(axis=1)
 
 
 def starts(tosses: Tosses, cube: Cube, recording: Recording) -> Starts:
-    """First frame of each toss, the only one that enters a replay."""
+    """Starting states of tosses, from the first frame of each, which is the only frame that a replay uses."""
     first = recording.lengths(tosses.first)
     quat, linvel = first[:, data.QUAT], first[:, data.LINVEL].copy()
     if recording.is_midframe:
@@ -127,7 +127,7 @@ def starts(tosses: Tosses, cube: Cube, recording: Recording) -> Starts:
 
 
 def sunken(begin: Starts, cube: Cube) -> np.ndarray:
-    """Depth (tosses,) of the lowest corner under the table at the start [m], 0 where it is above."""
+    """Depth (tosses,) of the lowest corner below the table at the start [m]; 0 if it is above."""
     return np.maximum(cube.table - begin.pos[:, 2] + corner_height(begin.quat, cube.side), 0.0)
 
 
@@ -136,17 +136,17 @@ def replay(
 ) -> tuple[np.ndarray, float]:
     """Simulate tosses from their starts, and sample them at the times of the recording.
 
-    A cube that starts under the table is lifted until it touches it (`sunken`): the engine refuses to start inside
-    a wall.
+    A cube that starts below the table is lifted until it touches it (`sunken`), since the engine refuses to start
+    inside a wall.
 
     Parameters
     ----------
     lengths : (tosses,) int
-        Frames of each, the start included.
+        Frames of each toss, the start included.
     begin : Starts
     cube : Cube
     accuracy : str or Accuracy
-        The step is the time between two frames.
+        Accuracy of the simulation, whose step is the time between two frames.
     threads : int
 
     Returns
@@ -184,13 +184,13 @@ def replay(
 
 
 def batches(lengths: np.ndarray) -> Iterator[np.ndarray]:
-    """Indices of tosses, in groups of similar length."""
+    """Yield indices of tosses in groups of similar length."""
     order = np.argsort(-np.asarray(lengths), kind="stable")
     return iter(np.array_split(order, -(-len(order) // BATCH)))
 
 
 def _watch(world: physics.World, frames: int) -> tuple[np.ndarray, float]:
-    """Poses (frames, worlds, 7) of a world from now on, and wall-clock time of its steps [s]."""
+    """Step a world; returns poses (frames, worlds, 7), the present ones first, and the time of the steps [s]."""
     step = physics.Stepper(world)
     table = np.empty((frames, world.worlds, 7))
     seconds = 0.0

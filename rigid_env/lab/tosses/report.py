@@ -1,4 +1,4 @@
-"""Measurements of ``rigid-env tosses``: fits, errors at each accuracy, and their limits."""
+"""Measurements of ``rigid-env tosses``: fits, errors at each accuracy, and the sources of these errors."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ HEAVY = ("heavy_x", "heavy_y", "heavy_z")
 MASS = (*CONTACT, "inertia", *HEAVY)
 HEADLINE = "contact and mass"
 
-REPEATS = 3  # of a timed replay, unless one takes longer than `PATIENCE`
+REPEATS = 3  # repeats of a timed replay; fewer if they take longer than `PATIENCE`
 PATIENCE = 2.0  # [s]
 NOISE_REPEATS = 5  # disturbed starts per toss
 
 TARGETS = {"position_mean": 0.125, "rotation_mean": 16.0}  # [cube widths, deg]
-# Others, their friction and contact parameters fitted in the same way on the 400 tosses: mean position error
+# Other engines, with friction and contact parameters fitted in the same way on the 400 tosses: mean position error
 # [cube widths] and mean rotation error [deg] over all 400.
 PEERS = {"MuJoCo": (0.133, 19.5), "Drake": (0.135, 17.5), "PyBullet": (0.145, 16.8)}
 
 
 @dataclass(frozen=True)
 class Setup:
-    """One way to fit: its parameters, the model of the recording, and the cube's other properties."""
+    """Description of one fit: its parameters, the model of the recording, and the values of the other parameters."""
 
     name: str
     parameters: tuple[str, ...]
@@ -45,16 +45,16 @@ class Setup:
 
 @dataclass(frozen=True)
 class Case:
-    """A setup, fitted, and its errors at the accuracy of the fit.
+    """Result of one fit: its parameters, and its errors at the accuracy of the fit.
 
     Attributes
     ----------
     setup : Setup
     fit : Fit
     trained, rest, every : Summary
-        Over the tosses fitted, over the others, and over all.
+        Errors of the fitted tosses, of the others, and of all.
     lifted : int
-        Tosses that would have started under the table, of all.
+        Number of tosses that would have started below the table, of all.
     """
 
     setup: Setup
@@ -65,7 +65,7 @@ class Case:
     lifted: int
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Result as a dict for JSON."""
         return {
             "name": self.setup.name, "recording": vars(self.setup.recording), "fit": self.fit.to_dict(),
             "trained": self.trained.to_dict(), "rest": self.rest.to_dict(), "all": self.every.to_dict(),
@@ -75,14 +75,16 @@ class Case:
 
 @dataclass(frozen=True)
 class Rung:
-    """Errors with the headline's parameters at one accuracy, over the tosses outside the fit.
+    """Errors of the main fit's parameters at one accuracy.
 
     Attributes
     ----------
     accuracy : str
+        Preset.
     rest, every : Summary
+        Errors of the tosses that were not fitted, and of all.
     us : float
-        Wall-clock time per simulated second [µs], on one thread in batches.
+        Wall-clock time per simulated second [µs], in batches.
     """
 
     accuracy: str
@@ -91,7 +93,7 @@ class Rung:
     us: float
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Errors as a dict for JSON."""
         return {
             "accuracy": self.accuracy, "rest": self.rest.to_dict(), "all": self.every.to_dict(),
             "us_per_simulated_second": self.us,
@@ -100,7 +102,7 @@ class Rung:
 
 @dataclass
 class Report:
-    """All measurements; the lists grow during a run."""
+    """All measurements of a run; `cases` and `ladder` grow while it runs."""
 
     tosses: Tosses
     accuracy: str
@@ -117,7 +119,7 @@ class Report:
         return all(case.fit.is_complete for case in self.cases)
 
     def to_dict(self) -> dict:
-        """For JSON."""
+        """Measurements as a dict for JSON."""
         return {
             "tosses": len(self.tosses), "frames": len(self.tosses.states), "fit_accuracy": self.accuracy,
             "split_seed": self.seed, "training_share": data.TRAINING_SHARE, "is_complete": self.is_complete,
@@ -129,9 +131,10 @@ class Report:
 
 
 def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -> list[Setup]:
-    """List the fits: the headline, its two variants and the steps towards it; or `names`, fitted like the headline.
+    """List the fits: the main one, two variants of it, and simpler ones; or a single fit of the parameters `names`.
 
-    The second fit uses the centre of mass from the free flights, which is not fitted to any error.
+    The fit "flights' centre of mass" takes the centre of mass from the free flights, so that it is not fitted to any
+    error. `scale` is the ratio of true to recorded lengths.
     """
     if names is not None:
         return [Setup(", ".join(check_names(names)), tuple(names), Recording())]
@@ -146,16 +149,16 @@ def setups(scale: float, flight: Flight, names: tuple[str, ...] | None = None) -
 
 
 class Measurement:
-    """Measures a `Report` step by step.
+    """Measurement of a `Report`, step by step.
 
     Parameters
     ----------
     tosses : Tosses
     accuracy : str
-        At which to fit.
+        Preset at which parameters are fitted.
     effort : Effort
     seed : int
-        Of the split.
+        Seed of the split into fitted tosses and the rest.
     threads : int
     names : tuple of str, optional
         Fit only these parameters, once.
@@ -176,10 +179,10 @@ class Measurement:
         return sum(self.effort.evaluations(len(setup.parameters)) for setup in self.setups)
 
     def run(self, tick: Callable[[str, int], None] = lambda what, done: None) -> Report:
-        """Fit each setup, then measure ladder and limits; ``tick`` gets the finished part and a number of evaluations.
+        """Fit each setup, then measure errors at each accuracy and their sources; returns the report.
 
-        After Ctrl-C no other setup is fitted, and the ladder has only the accuracy of the fit, so that the run ends
-        soon.
+        ``tick`` is called with the name of the finished part and a number of evaluations. After Ctrl-C no other setup
+        is fitted, and errors are measured only at the accuracy of the fit, so that the run ends soon.
         """
         for setup in self.setups:
             case = self._case(setup, lambda best, what=setup.name: tick(f"{what}: {best:.4f}", 1))
@@ -191,12 +194,12 @@ class Measurement:
         return self.report
 
     def headline(self) -> Case:
-        """Case of the ladder and limits: the headline's, or the last one fitted."""
+        """Result of the main fit, or of the last one if the main fit was not made."""
         cases = self.report.cases
         return next((case for case in cases if case.setup.name == HEADLINE), cases[-1])
 
     def errors(self, cube: Cube, recording: Recording, accuracy: str) -> tuple[Errors, np.ndarray, float]:
-        """Errors of all tosses, their poses, and wall-clock time per simulated second [µs]."""
+        """Errors of all tosses, poses of their replay, and wall-clock time per simulated second [µs]."""
         tosses = self.report.tosses
         poses, us = replay(tosses.lengths, starts(tosses, cube, recording), cube, accuracy, self.threads)
         return compare(recording.lengths(tosses.states), poses, tosses.offsets), poses, us
@@ -226,7 +229,7 @@ class Measurement:
             self.report.ladder.append(Rung(accuracy, errors.summary(self.others), errors.summary(), us))
 
     def _compile(self, accuracy: str) -> None:
-        """Take one step of one toss, so that timed runs contain no compilation."""
+        """Simulate one step of one toss, so that timed runs contain no compilation."""
         begin = starts(self.training.subset([0]), self.headline().fit.cube, Recording())
         replay(np.array([2]), begin, self.headline().fit.cube, accuracy, self.threads)
 

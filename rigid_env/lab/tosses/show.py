@@ -1,4 +1,4 @@
-"""The report in a terminal."""
+"""Print the report on tosses in a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ERRORS = "position\nmean", "position\nmedian", "rotation\nmean", "rotation\nmedi
 
 
 def show(report: Report, case: Case, console: Console) -> None:
-    """Print a report; `case` is that of its ladder and limits."""
+    """Print a report; `case` is the fit to which its ladder and limits belong."""
     first = report.cases[0]
     console.print(
         f"{len(report.tosses)} tosses, {first.trained.tosses} of them fitted at {report.accuracy} (split seed "
@@ -32,7 +32,7 @@ def show(report: Report, case: Case, console: Console) -> None:
 
 
 def _pair(summary: Summary) -> tuple[str, ...]:
-    """Mean and median of position and rotation, as text."""
+    """Text of mean and median of the position error, and of the rotation error."""
     return (
         f"{summary.position_mean:.4f}", f"{summary.position_median:.4f}", f"{summary.rotation_mean:.2f}",
         f"{summary.rotation_median:.2f}",
@@ -44,7 +44,7 @@ def _table(title: str, *names: str) -> Table:
 
 
 def case_table(report: Report) -> Table:
-    """Table of errors: each fit over the tosses of the fit, the rest and all, and those of other engines."""
+    """Table of errors for each fit, over the fitted tosses, the rest and all, with those of other engines below."""
     title = "over tosses: position error [cube widths], rotation error [degrees]"
     table = _table(title, "fit", "tosses", *ERRORS, "target")
     for case in report.cases:
@@ -64,7 +64,7 @@ def _parameters(case: Case) -> str:
 
 
 def ladder_table(report: Report, case: Case) -> Table:
-    """Table of errors over the rest, and of times, at each accuracy."""
+    """Table of errors over the tosses that were not fitted, and of computing times, at each accuracy."""
     title = f"the parameters of {case.setup.name!r}, rest, at each accuracy"
     table = _table(title, "accuracy", *ERRORS, "µs per\nsimulated s")
     for rung in report.ladder:
@@ -73,7 +73,7 @@ def ladder_table(report: Report, case: Case) -> Table:
 
 
 def limits_table(limits: Limits) -> Table:
-    """Table of errors that come from the start, and of tosses that end on the measured face and on another."""
+    """Table of errors from the noise of the start alone, and of the tosses that end on the measured or another face."""
     table = _table("what limits it", "rest", "tosses", *ERRORS)
     rows = (
         ("noise of the first frame alone", limits.noise), ("ends on the measured face", limits.landed),

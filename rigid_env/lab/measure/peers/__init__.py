@@ -1,8 +1,8 @@
 """Other engines on our scenes: one file per engine, one interface (`contender.Engine`), imported on demand.
 
-Each gives its own settings for a scene, its defaults first and then those that did best on such scenes, and says
-`Unsupported` where it cannot express one. What belongs to the scene (masses, gravity, friction, restitution, no
-damping) is the same for all of them and no setting.
+Each engine lists its own settings for a scene: its defaults first, then settings that did best on such scenes. It
+raises `Unsupported` if it cannot express a scene. Properties of the scene (masses, gravity, friction, restitution, no
+damping) are the same for all engines and no settings.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import importlib.util
 from physics.keywords import nearest_first
 from rigid_env.lab.measure.peers.contender import Engine, PeerContender, Unsupported
 
-# Name: (module of ours, its class, what has to be importable)
+# Name: (module in this package, its class, package of the engine)
 ENGINES = {
     "mujoco": ("rigid_env.lab.measure.peers.mujoco", "MuJoCo", "mujoco"),
     "pybullet": ("rigid_env.lab.measure.peers.pybullet", "PyBullet", "pybullet"),
@@ -24,23 +24,23 @@ __all__ = ["ENGINES", "Engine", "PeerContender", "Unsupported", "is_installed", 
 
 
 def is_installed(name: str) -> bool:
-    """True if the engine of this name can be imported.
+    """True if the package of the engine with this name is installed.
 
     Raises
     ------
     ValueError
-        There is no such peer.
+        There is no engine of this name.
     """
     return importlib.util.find_spec(_entry(name)[2]) is not None
 
 
 def load(name: str) -> Engine:
-    """The engine of this name.
+    """Make the engine of this name.
 
     Raises
     ------
     ValueError
-        There is no such peer.
+        There is no engine of this name.
     ModuleNotFoundError
         It is not installed; the message names the extra.
     """

@@ -1,4 +1,4 @@
-"""Interface of a peer, and its contender in a measurement beside our own engine."""
+"""Interface of other engines (peers), and a contender that measures one of them beside our engine."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ import physics
 from physics.work_precision.contender import TooSlow
 from physics.work_precision.errors import mechanical_energy
 
-# Longest run of a peer: one that takes longer is on no front, and a measurement has to end [s].
+# Longest run of another engine; a slower one would not be on the front of any scene [s].
 LIMIT = 10.0
 
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class Unsupported(Exception):
-    """Error of a peer that cannot express a scene; the message says why."""
+    """Error of an engine that cannot express a scene; the message says why."""
 
 
 def refuse_meetings(scene: physics.Scene) -> None:
-    """Refuse scenes whose bodies may meet, for a peer that gets contact with walls only.
+    """Refuse scenes whose bodies may touch each other, for an engine that gets contact with walls only.
 
     Raises
     ------
     Unsupported
-        Bodies of the scene touch each other.
+        Bodies of the scene may touch each other.
     """
     contact = scene.effect(physics.Contact)
     if contact is not None and contact.between_bodies and len(scene.bodies) > 1:
@@ -37,23 +37,23 @@ def refuse_meetings(scene: physics.Scene) -> None:
 
 
 class Run(Protocol):
-    """A scene in a peer, at one setting and one step."""
+    """Scene in another engine, at one setting and one step."""
 
     def restart(self) -> None:
-        """Return to the scene's start and clear the peer's memory."""
+        """Return to the scene's start, and clear the engine's memory of contacts."""
 
     def advance(self, steps: int) -> None:
-        """Take steps in the engine's quickest way."""
+        """Take this number of steps in the engine's quickest way."""
 
     def state(self) -> State:
-        """pos (bodies, 3) [m], quat (bodies, 4), linvel (bodies, 3) [m/s], angvel (bodies, 3) [rad/s].
+        """State of all bodies: pos (bodies, 3) [m], quat (bodies, 4), linvel [m/s] and angvel [rad/s] (bodies, 3).
 
-        In our conventions: of the centre of mass, world frame, quaternion (w, x, y, z).
+        It follows our conventions: centre of mass, world frame, quaternion (w, x, y, z).
         """
 
 
 class Engine(Protocol):
-    """A peer.
+    """Another engine.
 
     Attributes
     ----------
@@ -64,30 +64,32 @@ class Engine(Protocol):
     version: str
 
     def settings(self, scene: physics.Scene) -> Mapping[str, Mapping]:
-        """Options by name of the setting, the engine's defaults first."""
+        """Options of each setting, by the name of the setting; the engine's defaults come first."""
 
     def open(self, scene: physics.Scene, dt: float, **options) -> Run:
-        """Build a scene.
+        """Build a scene in the engine, with the options of one setting.
 
         Raises
         ------
         Unsupported
-            The engine cannot express it.
+            The engine cannot express the scene.
         """
 
 
 @dataclass(frozen=True)
 class PeerContender:
-    """A peer at one setting and one step: a `physics.work_precision.contender.Contender`.
+    """Another engine at one setting and one step: a `physics.work_precision.contender.Contender`.
 
     Parameters
     ----------
     peer : Engine
     scene : Scene
     setting : str
+        Name of the setting.
     options : mapping
+        Options of the setting.
     dt : float
-        [s].
+        Step [s].
     """
 
     peer: Engine
@@ -98,16 +100,16 @@ class PeerContender:
 
     @property
     def engine(self) -> str:
-        """Name of the peer."""
+        """Name of the engine."""
         return self.peer.name
 
     def watch(self, steps: int) -> physics.Trajectory:
-        """Samples at the start and after each step; a peer has neither events nor reports.
+        """Simulate `steps` steps, and return the states at the start and after each step, without events and reports.
 
         Raises
         ------
         TooSlow
-            After `LIMIT`.
+            The run takes longer than `LIMIT`.
         """
         run = self._open()
         samples, end = [run.state()], time.monotonic() + LIMIT
@@ -117,13 +119,13 @@ class PeerContender:
             run.advance(1)
             samples.append(run.state())
         pos, quat, linvel, angvel = (np.array(column) for column in zip(*samples))
-        with np.errstate(all="ignore"):  # what has blown up is for the errors to say
+        with np.errstate(all="ignore"):  # numbers that are not finite show in the errors
             energy = mechanical_energy(self.scene, pos, quat, linvel, angvel)
         t = self.dt * np.arange(steps + 1)
         return physics.Trajectory(t, pos, quat, linvel, angvel, energy=energy, events=(), reports=())
 
     def runner(self, steps: int) -> tuple[Callable[[], None], Callable[[], None]]:
-        """Functions that restart the scene, and take the timed steps."""
+        """Return two functions: one restarts the scene, the other takes `steps` steps and is timed."""
         run = self._open()
         return run.restart, lambda: run.advance(steps)
 
@@ -133,22 +135,22 @@ class PeerContender:
         return run
 
 
-# --- what peers ask of a scene -------------------------------------------------------------------------------------
+# --- properties of a scene for other engines -----------------------------------------------------------------------
 
 
 def restitution(scene: physics.Scene) -> float:
-    """Coefficient of the scene's impacts; 0 where they are plastic or there are none."""
+    """Restitution coefficient of the scene; 0 if impacts are plastic or there are no walls or no contact."""
     contact = scene.effect(physics.Contact)
     return float(contact.restitution or 0.0) if contact and scene.walls else 0.0
 
 
 def friction(scene: physics.Scene) -> float:
-    """Coefficient of friction; 0 without.
+    """Friction coefficient of the scene; 0 without friction.
 
     Raises
     ------
     Unsupported
-        It has two.
+        The scene has two coefficients.
     """
     effect = scene.effect(physics.Friction)
     if effect and effect.axis is not None:
@@ -157,11 +159,11 @@ def friction(scene: physics.Scene) -> float:
 
 
 def gravity(scene: physics.Scene) -> tuple[float, float, float]:
-    """Acceleration of gravity [m/s²]; zeros without."""
+    """Acceleration of gravity in the scene (3,) [m/s²]; zeros without gravity."""
     effect = scene.effect(physics.Gravity)
     return tuple(effect.acceleration) if effect else (0.0, 0.0, 0.0)
 
 
 def walls(scene: physics.Scene) -> tuple[physics.HalfSpace, ...]:
-    """Walls of the scene; none without contact."""
+    """Walls of the scene; empty without contact."""
     return tuple(scene.walls) if scene.effect(physics.Contact) else ()

@@ -1,12 +1,11 @@
 """Drake on our scenes: a MultibodyPlant, continuous with the RK3 integrator or discrete with TAMSI or SAP.
 
-It has no coefficient of restitution. In the Hunt-Crossley model of its TAMSI and continuous contacts,
-f = k x (1 + d ẋ), a body that arrives at v leaves at e v where d v (1 + e) = ln((1 + d v)/(1 - d e v)): `d` is set
-for the speed of the first impact of a body that falls without turning, and is right at that speed only. SAP has
-nothing of the kind.
+Drake has no coefficient of restitution. In the Hunt-Crossley model of its TAMSI and continuous contacts, f = k x (1 + d
+ẋ), a body that arrives at speed v leaves at e v if d v (1 + e) = ln((1 + d v)/(1 - d e v)). So `d` is set for the speed
+of the first impact of a body that falls without rotation, and fits only that speed. SAP has no such model.
 
-Its point contact puts one point between two shapes, on which no block rests. A block is therefore its eight vertices,
-as its users do it: against half-spaces that is the same shape.
+Its point contact makes one point between two shapes, on which a block cannot rest. So a block is given as its eight
+vertices, as users of Drake do; against half-spaces this is the same shape.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from rigid_env.lab.measure.peers.contender import (
     walls,
 )
 
-LOOSE, TIGHT = 1e-6, 1e-10  # accuracies of the integrator
+LOOSE, TIGHT = 1e-6, 1e-10  # target accuracies of the integrator
 
 FREE = {
     "default": {},
@@ -53,24 +52,24 @@ BOUNCING = {
 
 
 class Drake:
-    """See `contender.Engine`."""
+    """Drake as an engine for measurements, see `contender.Engine`."""
 
     name = "drake"
 
     def __init__(self):
         import_module("pydrake.common")  # it sets up the logging that is turned down below
         self.version = version("drake")
-        # It warns at every half-space that deformable bodies would not collide with it.
+        # Drake warns for every half-space that deformable bodies would not collide with it.
         logging.getLogger("drake").setLevel(logging.ERROR)
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """The discrete default, other contact approximations, and the error-controlled RK3."""
+        """Options of Drake by the name of the setting: contact approximations, and RK3 with error control."""
         if not walls(scene):
             return FREE
         return BOUNCING if restitution(scene) else RESTING
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
-        """See `contender.Engine`."""
+        """Build a scene in Drake, see `contender.Engine.open`."""
         refuse_meetings(scene)
         if any(body.kind == "hull" for body in scene.bodies):
             raise Unsupported("hulls are not handed to Drake")
@@ -85,7 +84,7 @@ def dissipation(scene: physics.Scene) -> float:
     Raises
     ------
     Unsupported
-        More than one body, one that turns, or one that does not fly towards a wall: there is no one such speed.
+        There is no single impact speed: several bodies, a rotating body, or a body that does not fly towards one wall.
     """
     e = restitution(scene)
     if e == 1.0:
@@ -101,7 +100,7 @@ def dissipation(scene: physics.Scene) -> float:
 
 
 def _arrival(scene: physics.Scene, body: physics.Body, wall: physics.HalfSpace) -> float:
-    """Speed [m/s] of a body at a wall, if it does not turn; 0 where it does not reach one."""
+    """Speed at which a body that does not rotate hits a wall [m/s]; 0 if it does not reach it."""
     normal, R = np.array(wall.normal), rotation_matrices(np.array(body.quat))
     reach = body.dimensions * (R.T @ normal)
     extent = np.abs(reach).sum() if body.kind == "block" else np.linalg.norm(reach)
@@ -112,7 +111,7 @@ def _arrival(scene: physics.Scene, body: physics.Body, wall: physics.HalfSpace) 
 
 
 class _Run:
-    """See `contender.Run`."""
+    """Scene in Drake, see `contender.Run`."""
 
     def __init__(self, scene, dt, approximation=None, accuracy=None, stiction=None, dissipation=None):
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph

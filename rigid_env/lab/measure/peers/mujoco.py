@@ -1,11 +1,11 @@
-"""MuJoCo on our scenes, through MJCF.
+"""MuJoCo on our scenes, given as MJCF.
 
-Its contacts are soft: a coefficient of restitution is no parameter of it. Where a scene has one, the reference
-acceleration of the contact, -b v - k r, is set such that one step turns the speed v into -e v: b = (1 + e)/h, with
-k = 0 or a small stiffness against sinking in (`solref` negative, see "Solver parameters" in MuJoCo's documentation).
+Its contacts are soft, without a coefficient of restitution. For a scene with restitution, the reference acceleration of
+a contact, -b v - k r, is set so that one step changes the speed v to -e v: b = (1 + e)/h, with k = 0 or a small
+stiffness against penetration (negative `solref`, see "Solver parameters" in MuJoCo's documentation).
 
-MuJoCo would start the scene anew when a state is not finite; that is switched off, so that it shows in the errors. Its
-warnings of it, on the screen and in a file, are not wanted then.
+By default MuJoCo resets the scene when a state is not finite. This is switched off, so that it shows in the errors, and
+so are MuJoCo's warnings about it.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ RESTING = {
     "stiff, elliptic, impratio 100": {"contact": "stiff", "cone": "elliptic", "impratio": 100},
 }
 BOUNCING = {
-    "default": {},  # plastic: it has no restitution
+    "default": {},  # without restitution
     "one-step": {"contact": "onestep"},
     "one-step, k 0.03/h²": {"contact": "onestep", "share": 0.03},
 }
 
 
 class MuJoCo:
-    """See `contender.Engine`."""
+    """MuJoCo as an engine for measurements, see `contender.Engine`."""
 
     name = "mujoco"
 
@@ -51,18 +51,22 @@ class MuJoCo:
         mujoco.set_mju_user_warning(lambda text: None)
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """Other integrators in free motion, stiff contacts at rest, one-step restitution where there is any."""
+        """Options of MuJoCo by the name of the setting.
+
+        Without walls the settings differ in the integrator, with walls in the contacts. A scene with restitution has
+        settings of its own, whose contacts rebound.
+        """
         if not walls(scene):
             return FREE
         return BOUNCING if restitution(scene) else RESTING
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
-        """See `contender.Engine`; MuJoCo can express all our scenes."""
+        """Build a scene in MuJoCo, which can express all our scenes; see `contender.Engine.open`."""
         return _Run(scene, dt, options)
 
 
 class _Run:
-    """See `contender.Run`."""
+    """Scene in MuJoCo, see `contender.Run`."""
 
     def __init__(self, scene: physics.Scene, dt: float, options: dict):
         import mujoco
@@ -104,13 +108,13 @@ def model_xml(
     contact: str = "default",
     share: float = 0.0,
 ) -> str:
-    """A scene as MJCF.
+    """MJCF text of a scene.
 
     Parameters
     ----------
     scene : Scene
     dt : float
-        [s].
+        Step [s].
     integrator, cone, impratio, noslip, solver
         MuJoCo's options of these names.
     contact : str
@@ -146,7 +150,7 @@ def _reference(contact: str, e: float, dt: float, share: float) -> str:
     if contact == "stiff":
         return f'solref="{2 * dt!r} 1" solimp="{HARD}"'
     if contact == "onestep":
-        # Both numbers zero would be read as a time constant: the stiffness is at least the smallest there is.
+        # MuJoCo would read two zeros as a time constant, so the stiffness is at least a tiny number.
         return f'solref="{-max(share / dt**2, 1e-12)!r} {-(1 + e) / dt!r}" solimp="{HARD}"'
     return ""
 

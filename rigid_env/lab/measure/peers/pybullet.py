@@ -1,7 +1,7 @@
 """PyBullet on our scenes, in double precision as its package is built, without a window.
 
-Its damping of all motion and its limit of the speed below which nothing bounces are no numerics but physics that our
-scenes do not have: both are zero here, at its defaults too.
+PyBullet damps all motion, and suppresses bounces below a speed. Our scenes do not have these effects, so both are zero
+here, at the setting "default", too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rigid_env.lab.measure.peers.contender import (
     walls,
 )
 
-FASTEST = 1e6  # limit of coordinates' speeds, far above what scenes have
+FASTEST = 1e6  # PyBullet's limit of speeds, set far above those in our scenes
 
 FREE = {"default": {}, "maximal coordinates": {"maximal": True}}
 TOUCHING = {
@@ -37,7 +37,7 @@ TOUCHING = {
 
 
 class PyBullet:
-    """See `contender.Engine`."""
+    """PyBullet as an engine for measurements, see `contender.Engine`."""
 
     name = "pybullet"
 
@@ -45,11 +45,14 @@ class PyBullet:
         self.version = version("pybullet")
 
     def settings(self, scene: physics.Scene) -> dict[str, dict]:
-        """Coordinates, iterations, and the distance at which a contact is forgotten."""
+        """Options of PyBullet by the name of the setting: coordinates, iterations, distance at which contacts end."""
         return TOUCHING if walls(scene) else FREE
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
-        """See `contender.Engine`; PyBullet cannot express ellipsoids and inertia tensors that are not diagonal."""
+        """Build a scene in PyBullet, which has no ellipsoids and no inertia tensors with off-diagonal entries.
+
+        See `contender.Engine.open`.
+        """
         refuse_meetings(scene)
         for body in scene.bodies:
             if body.kind == "ellipsoid":
@@ -62,7 +65,7 @@ class PyBullet:
 
 
 class _Run:
-    """See `contender.Run`; a restart builds the scene anew, so that no contact is remembered."""
+    """Scene in PyBullet, see `contender.Run`; a restart builds the scene anew, so that no contact is remembered."""
 
     def __init__(self, scene, dt, maximal=False, iterations=None, breaking=None, erp=None):
         with _silence():
@@ -96,7 +99,7 @@ class _Run:
         shape = self.client.createCollisionShape(self.client.GEOM_PLANE, planeNormal=wall.normal)
         place = tuple(wall.offset * n for n in wall.normal)
         plane = self.client.createMultiBody(0.0, shape, basePosition=place)
-        # Coefficients of a pair are products.
+        # PyBullet multiplies the coefficients of both bodies.
         self.client.changeDynamics(plane, -1, lateralFriction=1.0, restitution=1.0)
 
     def _add_body(self, body: physics.Body) -> int:
@@ -137,7 +140,7 @@ class _Run:
 
 @contextlib.contextmanager
 def _silence():
-    """Keep the output of its C code, at import and for each client, off the screen, by redirecting the descriptors."""
+    """Context manager that suppresses the output of PyBullet's C code, by redirecting the file descriptors."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = os.dup(1), os.dup(2)
@@ -147,7 +150,7 @@ def _silence():
     try:
         yield
     finally:
-        ctypes.CDLL(None).fflush(None)  # what C still holds back
+        ctypes.CDLL(None).fflush(None)  # write buffered output of C before the descriptors are restored
         for descriptor, copy in zip((1, 2), kept):
             os.dup2(copy, descriptor)
             os.close(copy)
