@@ -34,9 +34,10 @@ def random_policy(seed: int = 0, axes: int = AXES) -> Policy:
 def action_size(env_id: str) -> int:
     """Return how many numbers an action of an environment has."""
     env = make_vector_env(env_id, 1)
-    size = env.single_action_space.shape[0]
+    shape = env.single_action_space.shape
     env.close()
-    return size
+    assert shape is not None  # actions of every environment are rows of numbers
+    return shape[0]
 
 
 def baseline_policy(name: str, env_id: str, seed: int = 0) -> Policy:

@@ -13,11 +13,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from agents.checkpoint import load_trained
 from agents.config import RunFolder
 from agents.evaluate import RUN_HELP
-from rigid_env.cli.files import output_option
-from rigid_env.envs.policy_files import Network
+from rigid_env.cli.files import checked, make_parents
+from rigid_env.envs.policy_files import ARRAYS, Network
 from rigid_env.terminal import make_console, run_program
-
-LARGEST = 100_000  # of a file that ships with the package [bytes]
 
 
 def network_of(model: BaseAlgorithm) -> Network:
@@ -48,14 +46,19 @@ def _array(parameter: torch.Tensor) -> np.ndarray:
     return parameter.detach().cpu().numpy().astype(np.float32)
 
 
+def _checked_path(path: Path) -> Path:
+    return checked(path, (ARRAYS,))
+
+
 def main(
     run: Annotated[Path, typer.Argument(metavar="RUN_DIR", help=RUN_HELP, show_default=False)],
-    path: Annotated[Path, output_option("FILE", ".npz", help="Where the arrays go.")],
+    path: Annotated[Path, typer.Argument(metavar="FILE", help="Of the arrays, .npz.", callback=_checked_path)],
 ) -> None:
     """Write the policy of a run as plain arrays."""
     _, model = load_trained(RunFolder(run))
     network = network_of(model)
     console = make_console()
+    make_parents(path)
     network.save(path)
     console.print(f"written     {path}, {path.stat().st_size / 1e3:.1f} kB", soft_wrap=True)
 

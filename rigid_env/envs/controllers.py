@@ -113,7 +113,7 @@ CONTROLLERS = {
     "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
     "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
 }
-"""Where the controller of an environment stands, by its id."""
+"""Places of the controllers, ``module:function``, by the id of their environment."""
 
 
 def load_controller(env_id: str) -> Policy:

@@ -12,7 +12,7 @@ from rigid_env.launchers.job import Ended, Job, Launch
 
 @dataclass(frozen=True)
 class Place:
-    """Where the jobs of a command run.
+    """Launcher and its settings: where the jobs of a command run.
 
     Parameters
     ----------

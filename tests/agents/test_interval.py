@@ -46,7 +46,7 @@ def test_the_interquartile_mean_leaves_out_a_quarter_at_each_end():
 
 
 def test_a_bootstrap_interval_covers_its_mean_as_often_as_it_says():
-    """Of 100 samples of 20 normal numbers; 95 % less what few numbers cost, which is about 4 %."""
+    """Count it over 100 samples of 20 normal numbers; 95 % less what few numbers cost, which is about 4 %."""
     rng = np.random.default_rng(0)
     covered = 0
     for _ in range(100):

@@ -91,6 +91,7 @@ WITHOUT_EXTRAS = {
     "tosses": (("tosses.npz", "--quick"), 0, ""),
     "hard-cases": (("zeno", "--quick"), 0, ""),
     "view": (("rest",), 1, "view"),
+    "play": (("rigid_env/BlockReach-v0",), 1, "view"),
 }
 
 LACKING = [
@@ -99,6 +100,7 @@ LACKING = [
     (("hard-cases", "zeno", "--quick", "--plot", "h.png"), "plot"),
     (("tosses", "tosses.npz", "--quick", "--plot", "t.png"), "plot"),
     (("view", "rest", "--export", "v.html"), "view"),
+    (("play", "rigid_env/BlockReach-v0", "--video", "p.gif"), "render"),
 ]
 
 # Programs that each extra makes run: words, and the files that they write.

@@ -136,7 +136,7 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None, place: 
     """Run all cases of a plan with a progress bar, and print tables of the outcomes.
 
     `keep` is a file that is updated with all outcomes after each run. Ctrl-C ends the runs; the tables are still
-    printed. With `place` the cases of our engine run there, each at one setting; a place that prints its jobs runs none.
+    printed. With `place` the cases of our engine run there, each at one setting; one that prints its jobs runs none.
 
     Raises
     ------
