@@ -19,7 +19,7 @@ class RlGamesEnv(IVecEnv):
     rl_games adds γ V(s) to the reward of a step that ends by `time_outs`; s is the observation before this step.
     """
 
-    def __init__(self, config_name: str, num_actors: int, env: str, seed: int, **arguments):
+    def __init__(self, _name: str, num_actors: int, env: str, seed: int, **arguments):
         native = {"vectorization_mode": "vector_entry_point", "autoreset_mode": "SameStep"}
         self.envs = gym.make_vec(env, num_envs=num_actors, **native, **arguments)
         self.seed = seed
