@@ -65,7 +65,7 @@ def make_agent(worlds: int, epochs: int = 1, seed: int = 0, folder: str = "runs"
     }  # fmt: skip
     algorithm = {"algo": {"name": "a2c_continuous"}, "model": {"name": "continuous_a2c_logstd"}, "network": NETWORK}
     runner = Runner()
-    runner.load({"params": {"seed": seed, "config": config, **algorithm}})
+    runner.load({"params": {"seed": seed, "torch_threads": 1, "config": config, **algorithm}})  # the networks are small
     return runner.algo_factory.create(runner.algo_name, base_name="reach", params=runner.params)
 
 
