@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,6 +26,7 @@ from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
 
 LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", "print": "printed"}
+SCHEDULERS = ("asha",)  # of the launcher ray
 INTERRUPTED = 130
 
 
@@ -45,6 +47,21 @@ def check_arguments(trials: Sequence[Trial]) -> None:
             make_vector_env(config.env, 1, accuracy=config.accuracy, **config.env_kwargs).close()
 
 
+def check_scheduler(scheduler: str | None, launcher: str) -> None:
+    """Refuse a scheduler that is none, or that would have no effect; None is no scheduler.
+
+    Raises
+    ------
+    ValueError
+    """
+    if scheduler not in (None, *SCHEDULERS):
+        raise ValueError(f"scheduler is {scheduler!r}; allowed are {', '.join(SCHEDULERS)}")
+    if scheduler is not None and launcher != "ray":
+        raise ValueError(
+            f"scheduler is {scheduler!r} with the launcher {launcher!r}; allowed is --launcher ray with it"
+        )
+
+
 def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
     """Results of the complete trials, by name."""
     found = {trial.name: read_result(RunFolder(out / trial.name), trial.config) for trial in trials}
@@ -59,7 +76,7 @@ def sweep(
     Returns
     -------
     list of Outcome
-        One for each that is complete or has failed, in the order of the trials.
+        One for each that is complete, was stopped or has failed, in the order of the trials.
     """
     ended = {name: Outcome(name, result) for name, result in complete(trials, out).items()}
     left = [trial for trial in trials if trial.name not in ended]
@@ -78,7 +95,7 @@ def sweep(
 
 def _told(outcome: Outcome) -> str:
     if outcome.result is None:
-        return f"{outcome.name}: {outcome.error}"
+        return f"{outcome.name}: {outcome.stopped or outcome.error}"
     rate, steps = outcome.result["evaluation"]["success_rate"], outcome.result["steps"]
     return f"{outcome.name}: success {rate:.1%} after {steps / 1e6:.2f} M steps"
 
@@ -86,9 +103,9 @@ def _told(outcome: Outcome) -> str:
 def make_table(outcomes: Sequence[Outcome]) -> Table:
     """Success of each trial on fresh episodes."""
     table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
-    for name, result, _ in outcomes:
+    for name, result, _, stopped in outcomes:
         if result is None:
-            table.add_row(name, "failed", "", "", "", "")
+            table.add_row(name, stopped or "failed", "", "", "", "")
             continue
         judged = result["evaluation"]
         low, high = judged["interval"]
@@ -113,6 +130,9 @@ def main(
     launcher: Annotated[str, typer.Option(help=f"{', '.join(LAUNCHERS)}.")] = "local",
     jobs: Annotated[int, typer.Option(min=1, help="Trials at once.")] = 2,
     address: Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="asha: stop trials that fall behind; with --launcher ray.", show_default="none")
+    ] = None,
 ) -> None:
     """Train one agent for each environment, seed and combination of settings, and compare them.
 
@@ -126,6 +146,7 @@ def main(
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
         if launcher not in LAUNCHERS:
             raise ValueError(f"launcher is {launcher!r}; allowed are {', '.join(LAUNCHERS)}")
+        check_scheduler(scheduler, launcher)
         check_arguments(trials)
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -133,6 +154,8 @@ def main(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     launch = importlib.import_module(f"agents.launchers.{LAUNCHERS[launcher]}").launch
+    if scheduler is not None:
+        launch = partial(launch, scheduler=scheduler)
     try:
         outcomes = sweep(trials, out.resolve(), launch, jobs, address, console)
     except DependencyNotInstalled as error:
@@ -142,10 +165,9 @@ def main(
         console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
         raise typer.Exit(INTERRUPTED) from None
     if outcomes:
-        write_json(out / "results.json", {"trials": [{"name": each.name, "result": each.result, "error": each.error}
-                                                     for each in outcomes]})  # fmt: skip
+        write_json(out / "results.json", {"trials": [each._asdict() for each in outcomes]})
         console.print(make_table(outcomes))
-    if any(each.result is None for each in outcomes):
+    if any(each.error for each in outcomes):
         raise typer.Exit(1)
 
 
