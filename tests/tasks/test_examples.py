@@ -22,7 +22,8 @@ def found(monkeypatch):
 
 
 def test_these_are_all():
-    assert {path.stem for path in FOLDER.glob("*.py")} == set(CLASSES)
+    tasks = {path.stem for path in FOLDER.glob("*.py") if "register_task(" in path.read_text(encoding="utf-8")}
+    assert tasks == set(CLASSES)
 
 
 @pytest.mark.parametrize("name", CLASSES)
