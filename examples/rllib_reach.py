@@ -23,7 +23,7 @@ asked = parser.parse_args()
 
 
 def warm() -> None:
-    """Compile the kernels of a node: RLlib drops a worker whose first sample takes over 60 s (`sample_timeout_s`)."""
+    """Compile the kernels of a node: by default RLlib drops a sample that takes over 60 s, as a cold compile may."""
     envs = gym.make_vec(ENV, num_envs=1, vectorization_mode="vector_entry_point", **SETTINGS)
     envs.reset(seed=0)
     envs.step(envs.action_space.sample())
@@ -46,7 +46,7 @@ if not asked.address:
 ray.init(asked.address or cluster.address)
 nodes = [NodeAffinitySchedulingStrategy(node["NodeID"], soft=False) for node in ray.nodes() if node["Alive"]]
 ray.get([ray.remote(warm).options(num_cpus=0, scheduling_strategy=node).remote() for node in nodes])
-config = PPOConfig().environment(ENV, env_config=SETTINGS).debugging(seed=0)
+config = PPOConfig().environment(ENV, env_config=SETTINGS).debugging(seed=0).env_runners(sample_timeout_s=600)
 config.env_runners(num_env_runners=len(nodes), num_envs_per_env_runner=128, gym_env_vectorize_mode="vector_entry_point")
 config.training(train_batch_size=16_384, minibatch_size=2048, num_epochs=5, lr=1e-3, lambda_=0.95, clip_param=0.2)
 config.training(vf_loss_coeff=0.5, grad_clip=0.5, use_kl_loss=False)
