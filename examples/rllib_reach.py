@@ -57,4 +57,4 @@ while reached < asked.target:
     steps, reached = result["env_runners"]["num_env_steps_sampled_lifetime"], success(algorithm, 200, seed=1)
     print(f"{steps:9,.0f} steps  {result['time_total_s']:5.0f} s  success {reached:.1%}", flush=True)
 print(f"success {success(algorithm, 500, seed=0):.1%} of 500 fresh episodes")
-algorithm.stop()
+ray.shutdown()

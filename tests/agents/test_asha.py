@@ -61,6 +61,7 @@ def trials(tmp_path):
 @pytest.fixture
 def short(monkeypatch):
     monkeypatch.setattr(runs, "EVALUATION_EPISODES", 4)
+    monkeypatch.setattr(supervisor, "POINT_EVERY", 0.0)
     monkeypatch.setattr(supervisor, "CHECKPOINT_EVERY", 0.0)
     monkeypatch.setattr(supervisor, "CHECKPOINT_SHARE", float("inf"))  # a checkpoint after each rollout
 
