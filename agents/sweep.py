@@ -7,6 +7,7 @@ is `agents.train.run_or_resume`. What is complete stands in ``DIR/results.json``
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,7 @@ import typer
 from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 
+from agents import asha
 from agents.algorithms import algorithm_arguments, make_vector_env
 from agents.config import HYPERPARAMETERS, RunFolder
 from agents.evaluate import write_json
@@ -25,6 +27,7 @@ from rigid_env.launchers import LAUNCHERS, load
 from rigid_env.launchers.job import Ended, Launch
 from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
 
+SCHEDULERS = ("asha",)  # of the launcher ray
 INTERRUPTED = 130
 
 
@@ -46,6 +49,21 @@ def check_arguments(trials: Sequence[Trial]) -> None:
             make_vector_env(config.env, 1, accuracy=config.accuracy, **config.env_kwargs).close()
 
 
+def check_scheduler(scheduler: str | None, launcher: str) -> None:
+    """Refuse a scheduler that is none, or that would have no effect; None is no scheduler.
+
+    Raises
+    ------
+    ValueError
+    """
+    if scheduler not in (None, *SCHEDULERS):
+        raise ValueError(f"scheduler is {scheduler!r}; allowed are {', '.join(SCHEDULERS)}")
+    if scheduler is not None and launcher != "ray":
+        raise ValueError(
+            f"scheduler is {scheduler!r} with the launcher {launcher!r}; allowed is --launcher ray with it"
+        )
+
+
 def complete(trials: Sequence[Trial], out: Path) -> dict[str, dict[str, Any]]:
     """Results of the trials that are complete, by name."""
     found = {trial.name: read_result(RunFolder(out / trial.name), trial.config) for trial in trials}
@@ -60,7 +78,7 @@ def sweep(
     Returns
     -------
     list of Ended
-        Ends of the trials that are complete or have failed, in the order of the trials.
+        Ends of the trials that are complete, were stopped or have failed, in the order of the trials.
     """
     ended = {name: Ended(name, result) for name, result in complete(trials, out).items()}
     left = [trial for trial in trials if trial.name not in ended]
@@ -79,7 +97,7 @@ def sweep(
 
 def _told(end: Ended) -> str:
     if end.result is None:
-        return f"{end.name}: {end.error}"
+        return f"{end.name}: {end.stopped or end.error}"
     rate, steps = end.result["evaluation"]["success_rate"], end.result["steps"]
     return f"{end.name}: success {rate:.1%} after {steps / 1e6:.2f} M steps"
 
@@ -87,9 +105,9 @@ def _told(end: Ended) -> str:
 def make_table(ends: Sequence[Ended]) -> Table:
     """Table of the success of each trial on fresh episodes."""
     table = Table(["trial", *number_columns("success", "95 %", "return", "M steps", "s")], "sweep")
-    for name, result, _ in ends:
+    for name, result, _, stopped in ends:
         if result is None:
-            table.add_row(name, "failed", "", "", "", "")
+            table.add_row(name, stopped or "failed", "", "", "", "")
             continue
         judged = result["evaluation"]
         low, high = judged["interval"]
@@ -114,6 +132,9 @@ def main(
     launcher: Annotated[str, typer.Option(help=f"{', '.join(LAUNCHERS)}.")] = "local",
     jobs: Annotated[int, typer.Option(min=1, help="Trials at once.")] = 2,
     address: Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="asha: stop trials that fall behind; with --launcher ray.", show_default="none")
+    ] = None,
 ) -> None:
     """Train one agent for each environment, seed and combination of settings, and compare them.
 
@@ -126,12 +147,15 @@ def main(
             grid["accuracy"] = [checked_preset(name.strip()) for name in accuracy.split(",")]
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
         launch = load(launcher)
+        check_scheduler(scheduler, launcher)
         check_arguments(trials)
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise typer.BadParameter(f"--out is {str(out)!r}, which cannot be made: {error.strerror}") from error
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
+    if scheduler is not None:
+        launch = partial(asha.launch, trials)
     try:
         ends = sweep(trials, out.resolve(), launch, jobs, address, console)
     except DependencyNotInstalled as error:
@@ -141,10 +165,9 @@ def main(
         console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
         raise typer.Exit(INTERRUPTED) from None
     if ends:
-        write_json(out / "results.json", {"trials": [{"name": each.name, "result": each.result, "error": each.error}
-                                                     for each in ends]})  # fmt: skip
+        write_json(out / "results.json", {"trials": [each._asdict() for each in ends]})
         console.print(make_table(ends))
-    if any(each.result is None for each in ends):
+    if any(each.error for each in ends):
         raise typer.Exit(1)
 
 

@@ -13,6 +13,7 @@ from rich.console import Console
 from agents.algorithms import make_training_env
 from agents.config import RunConfig, RunInUse
 from agents.run import run_or_resume
+from agents.supervisor import OnCheckpoint
 from agents.training import Interrupted
 from agents.trials import Trial
 from rigid_env.launchers.job import Job
@@ -20,14 +21,16 @@ from rigid_env.launchers.job import Job
 PATIENCE = 60.0  # for a folder that a lost worker still holds [s]
 
 
-def make_job(trial: Trial, out: Path) -> Job:
-    """Make the job that runs a trial in its folder in `out`, or goes on with it."""
-    call = partial(run_trial, trial.name, trial.config, str(out))
+def make_job(trial: Trial, out: Path, on_checkpoint: OnCheckpoint | None = None) -> Job:
+    """Make the job that runs a trial in its folder in `out`, or goes on with it; see `run_trial`."""
+    call = partial(run_trial, trial.name, trial.config, str(out), on_checkpoint=on_checkpoint)
     return Job(trial.name, call, trial.command(out), partial(warm_kernels, trial.config))
 
 
-def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE) -> dict[str, Any]:
-    """Run a trial, or go on with it, and return its result.
+def run_trial(
+    name: str, config: RunConfig, out: str, patience: float = PATIENCE, on_checkpoint: OnCheckpoint | None = None
+) -> dict[str, Any]:
+    """Run a trial, or go on with it, and return its result; `on_checkpoint` ends it by an error of its own.
 
     Raises
     ------
@@ -41,7 +44,8 @@ def run_trial(name: str, config: RunConfig, out: str, patience: float = PATIENCE
     limit, is_told = time.monotonic() + patience, False
     while True:
         try:
-            return run_or_resume(config, Path(out) / name, console=Console(quiet=True))
+            quiet = Console(quiet=True)
+            return run_or_resume(config, Path(out) / name, on_checkpoint=on_checkpoint, console=quiet)
         except RunInUse:
             if time.monotonic() >= limit:
                 raise

@@ -24,7 +24,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     },
     "plot": {"matplotlib": "matplotlib"},
     "view": {"viser": "viser"},
-    "ray": {"ray": "Ray"},
+    "ray": {"ray": "Ray", "pandas": "pandas", "pyarrow": "pyarrow"},
     "submitit": {"submitit": "submitit"},
     "minari": {"minari": "Minari", "h5py": "h5py"},
     "bench": {"mujoco": "MuJoCo"},

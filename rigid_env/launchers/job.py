@@ -31,12 +31,17 @@ class Job:
     warm: Callable[[], None] | None = None
 
 
+class Stopped(Exception):
+    """A scheduler has ended a job; the message says which, and where."""
+
+
 class Ended(NamedTuple):
-    """End of a job: what its call returned, or None and an error in one line."""
+    """End of a job: what its call returned; or None, with an error in one line or the message of a scheduler."""
 
     name: str
     result: Any
     error: str = ""
+    stopped: str = ""
 
 
 class Launch(Protocol):
@@ -64,6 +69,8 @@ def run_job(job: Job) -> Ended:
     """Call a job; its error is its end, so that the others go on. Only Ctrl-C ends more than the job."""
     try:
         return Ended(job.name, job.call())
+    except Stopped as stop:
+        return Ended(job.name, None, stopped=str(stop))
     except Exception as error:
         return Ended(job.name, None, _told(error))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from rigid_env.extras import require
@@ -15,7 +16,14 @@ def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None 
     A task takes one processor. Ray starts one whose worker or node is lost again. One task warms the kernels of each
     node first. `folder` is not used.
     """
-    require("ray", purpose="--launcher ray")
+    require("ray", "ray", purpose="--launcher ray")
+    with connected(at_once, address):
+        yield from run(jobs)
+
+
+@contextmanager
+def connected(at_once: int, address: str | None) -> Iterator[None]:
+    """Connect to a cluster while the block runs; to that of the program where it has one already."""
     import ray
 
     is_ours = not ray.is_initialized()
@@ -23,19 +31,26 @@ def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None 
         local = {} if address else {"num_cpus": at_once, "include_dashboard": False}
         ray.init(address=address or "local", log_to_driver=False, **local)
     try:
-        _warm_nodes(jobs)
-        run = ray.remote(num_cpus=1, max_retries=RETRIES)(run_job)
-        tasks = {run.remote(job): job.name for job in jobs}
-        while tasks:
-            (done,), _ = ray.wait(list(tasks), num_returns=1)
-            name = tasks.pop(done)
-            try:
-                yield ray.get(done)
-            except ray.exceptions.RayError as error:
-                yield Ended(name, None, str(error).strip().splitlines()[-1])
+        yield
     finally:
         if is_ours:
             ray.shutdown()
+
+
+def run(jobs: Sequence[Job]) -> Iterator[Ended]:
+    """Run jobs as tasks of the cluster that this program is connected to, and yield the end of each as it comes."""
+    import ray
+
+    _warm_nodes(jobs)
+    task = ray.remote(num_cpus=1, max_retries=RETRIES)(run_job)
+    tasks = {task.remote(job): job.name for job in jobs}
+    while tasks:
+        (done,), _ = ray.wait(list(tasks), num_returns=1)
+        name = tasks.pop(done)
+        try:
+            yield ray.get(done)
+        except ray.exceptions.RayError as error:
+            yield Ended(name, None, str(error).strip().splitlines()[-1])
 
 
 def _warm_nodes(jobs: Sequence[Job]) -> None:

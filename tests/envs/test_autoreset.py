@@ -80,15 +80,17 @@ def test_reset_mask_leaves_the_callers_options_alone(vector_class):
     assert options.keys() == {"reset_mask"}
 
 
-def test_vector_episode_statistics_count_each_step_once(vector_class):
-    for mode in ("NextStep", "SameStep"):
-        envs = gym.wrappers.vector.RecordEpisodeStatistics(vector_class(2, autoreset_mode=mode, max_episode_steps=3))
-        envs.reset(seed=0)
-        lengths = []
-        for _ in range(9):
-            infos = envs.step(STILL)[4]
-            lengths += infos["episode"]["l"][infos["_episode"]].tolist() if "episode" in infos else []
-        assert set(lengths) == {3}
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_vector_episode_statistics_count_each_step_once(vector_class, mode):
+    if mode == "SameStep" and tuple(map(int, gym.__version__.split(".")[:2])) < (1, 4):
+        pytest.skip("needs Gymnasium 1.4: before, its wrapper leaves out the first step of all episodes but the first")
+    envs = gym.wrappers.vector.RecordEpisodeStatistics(vector_class(2, autoreset_mode=mode, max_episode_steps=3))
+    envs.reset(seed=0)
+    lengths = []
+    for _ in range(9):
+        infos = envs.step(STILL)[4]
+        lengths += infos["episode"]["l"][infos["_episode"]].tolist() if "episode" in infos else []
+    assert set(lengths) == {3}
 
 
 def test_step_before_reset(env_class, vector_class):

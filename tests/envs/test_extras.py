@@ -145,6 +145,8 @@ def test_the_extras_are_those_of_the_metadata():
         "yaml": "pyyaml",
         "pydrake": "drake",
         "torch": "stable-baselines3",
+        "pandas": "ray",  # as ray[tune]
+        "pyarrow": "ray",
     }
 
     def all_of(extra):
