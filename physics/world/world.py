@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.accuracy import PRESETS, Accuracy, resolve
-from physics.annotations import Preset
+from physics.accuracy import PRESETS, AccuracyArgument, resolve
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
@@ -49,8 +48,9 @@ class World(Touching):
         Size of the batch.
     dt : float
         Time that one `step` advances [s].
-    accuracy : str or Accuracy
-        ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
+    accuracy : str, Accuracy or mapping
+        ``fast``, ``balanced``, ``precise``, ``reference``, a `physics.Accuracy`, or a mapping of its settings that
+        differ from the preset under the key ``preset`` (``balanced``), such as ``{"tolerance": 1e-3}``.
     threads : int
         Threads that share a step, at most as many as processors: each takes worlds of its own range, then of the
         others'. Between steps that follow each other within 0.3 ms they wait without sleeping.
@@ -77,7 +77,7 @@ class World(Touching):
         scene: Scene,
         worlds: int = 1,
         dt: float = 0.01,
-        accuracy: Preset | Accuracy = "balanced",
+        accuracy: AccuracyArgument = "balanced",
         threads: int = 1,
     ) -> None:
         validation.instance(scene, Scene, "scene", "a physics.Scene")

@@ -109,7 +109,7 @@ class BlockReachEnv(BlockEnv):
     | `friction` | 0.5 | Coulomb coefficient against the walls |
     | `restitution` | 0.2 | of the block against the walls |
     | `gravity` | 9.81 | along -y [m/s²] |
-    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `accuracy` | `"balanced"` | preset of the engine, a `physics.Accuracy`, or a dict of its settings |
     | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |

@@ -16,6 +16,7 @@ from rigid_env.envs.arguments import CommonArguments, TaskArgument
 from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
+from rigid_env.envs.plain import PlainSpec
 from rigid_env.envs.sources import Obs, StateSource, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
@@ -34,7 +35,7 @@ class _Arguments(CommonArguments, TaskArgument):
     pass
 
 
-class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
+class RigidEnv(Exclusive, PlainSpec, gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters

@@ -120,7 +120,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     | Argument | Default | Meaning |
     | --- | --- | --- |
-    | `scene` | None | scene file (.toml, .xml, .urdf), name of a canonical scene, or `physics.Scene`; must be given |
+    | `scene` | None | scene file (.toml, .xml, .urdf) or its content, canonical scene, or `physics.Scene`; needed |
     | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
     | `force` | None | longest force over the body's weight (0.9) |
     | `torque` | None | longest torque over weight times reach (0.5) |
@@ -131,7 +131,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | `frame_skip` | None | physics steps per control step (5) |
     | `dt` | None | physics step (0.005) [s] |
     | `episode_steps` | None | control steps after which an episode is truncated, for the file's `max_episode_steps` |
-    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `accuracy` | `"balanced"` | preset of the engine, a `physics.Accuracy`, or a dict of its settings |
     | `effects` | () | `physics` effects besides, or instead of the scene's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |
@@ -178,7 +178,7 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
     Parameters
     ----------
     num_envs : int
-    scene : physics.Scene, str or Path
+    scene : physics.Scene, str, Path or mapping
     autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
     contacts, impacts
         As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.

@@ -20,6 +20,7 @@ from rigid_env.envs.arguments import TaskArgument, VectorArguments
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
+from rigid_env.envs.plain import PlainSpec
 from rigid_env.envs.sources import Obs, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
@@ -39,7 +40,7 @@ class _Arguments(VectorArguments, TaskArgument):
     pass
 
 
-class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
+class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
     World i goes through the same bits as the single environment with the same seed, whatever `num_envs`.

@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import physics
+from physics.io.plain import read_effects
 
 REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
 """Parameter of a task that each effect replaces."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:
-    """The effects as a tuple.
+    """The effects as a tuple; each is given as an object or as a table of a scene file.
 
     Raises
     ------
     ValueError
-        They are no sequence, or one takes the place of a parameter that is drawn from a range.
+        They are no sequence, one cannot be read, or one takes the place of a parameter that is drawn from a range.
     """
     try:
         effects = tuple(effects)
     except TypeError:
         raise ValueError(f"effects is {effects!r}; allowed is a sequence of effects") from None
+    effects = read_effects(effects)
     for field, effect in replaced(effects).items():
         if field in randomised:
             raise ValueError(f"effects holds {effect!r}, but {field} is drawn from a range; give one of the two")

@@ -58,9 +58,11 @@ class Task(Starts):
     ----------
     worlds : int
         Size of the batch.
-    accuracy : str or physics.Accuracy
+    accuracy : str, physics.Accuracy or mapping
+        As of `physics.World`.
     effects : sequence of physics effects
-        Added to the scene's; one of the same class replaces the scene's. What is drawn cannot be replaced.
+        Added to the scene's; one of the same class replaces the scene's. What is drawn cannot be replaced. Each is an
+        object or plain data as in a scene file, such as ``{"kind": "Drag", "coefficient": 0.2}``.
     draws : mapping, optional
         Distributions in place of the task's own of the same names; a number is fixed, a pair (low, high) uniform.
     frame_skip : int
