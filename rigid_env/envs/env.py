@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from physics.parallel.exclusive import Exclusive, exclusive, in_use
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs.arguments import CommonArguments, TaskArgument
-from rigid_env.envs.attributes import value_of
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
 from rigid_env.envs.plain import PlainSpec
@@ -103,7 +102,7 @@ class RigidEnv(Exclusive, PlainSpec, gym.Env[Obs, NDArray[Any]]):
         -------
         observation : (entries,) float32
         info : dict
-            As of `step`, and what was drawn for the episode, by name, except what `effects` take the place of.
+            As of `step`.
 
         Raises
         ------
@@ -118,10 +117,7 @@ class RigidEnv(Exclusive, PlainSpec, gym.Env[Obs, NDArray[Any]]):
         self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
-        values = self.task.drawn
-        drawn = {name: value_of(values[name][0]) for name in self.task.own_draws}
-        info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
-        return self._source.one(0), {**info, **drawn}
+        return self._source.one(0), self._info(self.task.outcome[0].tolist(), self.task.status.item())
 
     def _remember_generator(self) -> Undo:
         kept = self._np_random, self._np_random_seed, self.task.generators[0]
@@ -148,6 +144,8 @@ class RigidEnv(Exclusive, PlainSpec, gym.Env[Obs, NDArray[Any]]):
         truncated : bool
             Always False: the time limit is `gymnasium.make`'s.
         info : dict
+            Numbers of the step, and values drawn for the episode, except those that `effects` take the place of. Arrays
+            of drawn values are read-only: the infos of an episode share them.
 
         Raises
         ------

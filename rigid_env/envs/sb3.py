@@ -30,7 +30,7 @@ class RigidVecEnv(VecEnv):
     """A `RigidVectorEnv` behind the interface that Stable-Baselines3 trains on.
 
     Worlds start anew in the step in which their episode ends; the info of that step holds
-    ``terminal_observation``, ``TimeLimit.truncated``, the numbers of the task's infos, and, with `monitor`,
+    ``terminal_observation``, ``TimeLimit.truncated``, the numbers of the task's infos and draws, and, with `monitor`,
     ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
     The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
     of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
@@ -198,8 +198,7 @@ class RigidVecEnv(VecEnv):
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
         """One world's info at the start of its episode."""
-        keys = (*self._keys(), *self.vector_env.task.own_draws)
-        return {key: infos[key][world].tolist() for key in keys}
+        return {key: infos[key][world].tolist() for key in self._keys()}
 
     def _keys(self) -> tuple[str, ...]:
         """Keys of every info."""

@@ -113,7 +113,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     `info` holds `is_success` and `physics_status`, a `physics.Status`: 0 when nothing went wrong in the step,
     contact problems above their tolerance included. With a goal also `distance` [m], `speed` [m/s], and the
-    terms of the reward, `reward_progress` and `reward_success`. That of `reset` also holds what was drawn:
+    terms of the reward, `reward_progress` and `reward_success`, are in it. So are the draws of the episode:
     `goal`, `start_pos`, `start_linvel`, `start_angvel`.
 
     ## Arguments

@@ -122,7 +122,7 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
         -------
         observations : (num_envs, entries) float32
         infos : dict of arrays
-            With what was drawn for the new episodes, by name, except what `effects` take the place of.
+            As of `step`; zero in worlds that are not reset.
 
         Raises
         ------
@@ -143,9 +143,7 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
             self._begin(rows, options)
         self._waiting[rows] = False
         self._show()
-        infos = vector_infos.of_outcomes(self.task, mask, self.contact_infos)
-        vector_infos.add_drawn(infos, self.task, rows)
-        return self._source.all(), infos
+        return self._source.all(), vector_infos.of_outcomes(self.task, mask, self.contact_infos)
 
     @exclusive
     def step(self, actions: ArrayLike) -> Step[Obs]:
@@ -161,8 +159,9 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
         rewards : (num_envs,) float64
         terminations, truncations : (num_envs,) bool
         infos : dict of arrays
-            With ``final_obs`` and ``final_info`` of the episodes that ended, in mode ``SameStep``; with the parameters
-            of the episodes that begin in this step, as `reset` tells them, in both modes that start anew.
+            Numbers of the step, and values drawn for the running episodes, except those that `effects` take the place
+            of. Arrays of drawn values, and the mask of all keys, are read-only: infos share them. In mode ``SameStep``
+            also ``final_obs`` and ``final_info`` of the episodes that ended.
 
         Raises
         ------
@@ -208,7 +207,6 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-            vector_infos.add_drawn(finals, task, rows)
         self._show()
         infos = vector_infos.of_outcomes(task, contacts=self.contact_infos)
         return self._source.all(), rewards, terminations, truncations, {**infos, **finals}

@@ -13,11 +13,16 @@ from rigid_env.tasks import layout as col
 
 def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
     """Keys of every info, of a step and of a start."""
-    return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else contacts.keys))
+    told = () if contacts is None else contacts.keys
+    return ("is_success", *task.info_names, "physics_status", *told, *task.own_draws)
 
 
 def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """Infos of the last step or start for the worlds of `mask` (worlds,) bool; zero in the others."""
+    """Infos of the last step or start for the worlds of `mask` (worlds,) bool; zero in the others.
+
+    The drawn values are read-only arrays, which all infos share until an episode begins. So is the mask, which the keys
+    of one info share.
+    """
     outcome = task.outcome
     infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
     for column, name in enumerate(task.info_names, col.INFO):
@@ -25,24 +30,18 @@ def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInf
     infos["physics_status"] = task.status.copy()
     if contacts is not None:
         infos.update(contacts.all())
+    told = task.episodes.tell()
+    for name in task.own_draws:
+        infos[name] = told[name] if mask is None else told[name].copy()
     if mask is None:
         mask = np.ones(task.worlds, dtype=np.bool_)
     else:
+        mask = mask.copy()
         for values in infos.values():
             values[~mask] = 0
-    infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
+    mask.flags.writeable = False
+    infos.update({f"_{key}": mask for key in tuple(infos)})
     return infos
-
-
-def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
-    """Add the values drawn for episodes that begin in the worlds `rows` (n,); zero in the others."""
-    mask = np.zeros(task.worlds, dtype=np.bool_)
-    mask[rows] = True
-    for name in task.own_draws:
-        now = task.drawn[name]
-        told = np.zeros_like(now)
-        told[rows] = now[rows]
-        infos[name], infos[f"_{name}"] = told, mask.copy()
 
 
 def of_ended(task: Task, source, mask: np.ndarray, contacts: ContactInfos | None = None) -> dict[str, Any]:

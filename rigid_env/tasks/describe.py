@@ -179,7 +179,7 @@ def _starts(task: Task) -> Section:
     if rows:
         text = (
             "Each episode draws the values of the table. `reset(options=...)` fixes what it names, for this episode; "
-            "the other draws of a seed stay the same. The `info` of `reset` tells all of them."
+            "the other draws of a seed stay the same. Every `info` tells all of them."
         )
     return Section("Starting State", (*_own_text(task, "place"), text), ("Option", "Drawn", "Numbers", "Meaning"), rows)
 

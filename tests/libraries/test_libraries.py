@@ -11,7 +11,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-import rigid_env  # noqa: F401 (registers)
+import physics
+import rigid_env
+from tests.tasks.conftest import Slide
 
 REACH = "rigid_env/BlockReach-v0"
 WORLDS = 4
@@ -39,6 +41,16 @@ def test_torchrl_takes_an_id_processes_and_the_native_batch():
     workers = ParallelEnv(2, partial(GymEnv, f"rigid_env:{REACH}"))  # a process imports the module
     assert workers.rollout(3).shape == (2, 3)
     workers.close()
+
+
+def test_torchrl_reads_the_infos_of_the_native_batch():
+    pytest.importorskip("torchrl")
+    from torchrl.envs.libs.gym import GymWrapper
+
+    env = GymWrapper(batch("Disabled", mass=(4.0, 8.0))).auto_register_info_dict()
+    found = env.rollout(3, break_when_any_done=False)
+    assert found["next", "goal"].shape == (WORLDS, 3, 2)
+    assert (found["mass"] == found["next", "mass"]).all()
 
 
 def test_skrl_takes_the_native_batch():
@@ -69,11 +81,14 @@ def test_a_minari_data_set_has_the_bits_of_the_episodes(tmp_path, monkeypatch):
     pytest.importorskip("h5py")
     pytest.importorskip("jax")
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    env = minari.DataCollector(gym.make(REACH, max_episode_steps=20))
+    arguments = {"mass": (4.0, 8.0), "accuracy": physics.Accuracy(tolerance=1e-3), "effects": [physics.Drag(0.2)]}
+    env = minari.DataCollector(gym.make(REACH, max_episode_steps=20, **arguments), record_infos=True)
     env.action_space.seed(0)
-    seen = []
+    seen, masses = [], []
     for seed in range(2):
-        seen.append([env.reset(seed=seed)[0]])
+        observation, info = env.reset(seed=seed)
+        seen.append([observation])
+        masses.append(info["mass"])
         is_over = False
         while not is_over:
             observation, _, terminated, truncated, _ = env.step(env.action_space.sample())
@@ -82,6 +97,27 @@ def test_a_minari_data_set_has_the_bits_of_the_episodes(tmp_path, monkeypatch):
     env.create_dataset("rigid/reach/random-v0", algorithm_name="random")
     kept = minari.load_dataset("rigid/reach/random-v0")
     assert kept.total_episodes == 2
-    for episode, observations in zip(kept.iterate_episodes(), seen):
+    again = kept.recover_environment()
+    for episode, observations, mass in zip(kept.iterate_episodes(), seen, masses):
         np.testing.assert_array_equal(episode.observations, np.array(observations))
-    assert kept.recover_environment().unwrapped.spec.id == REACH
+        assert episode.infos["mass"].tolist() == [mass] * len(observations)
+        assert episode.infos["goal"].shape == (len(observations), 2)
+        replayed = [again.reset(seed=int(episode.id))[0], *(again.step(action)[0] for action in episode.actions)]
+        np.testing.assert_array_equal(episode.observations, np.array(replayed))
+    assert again.unwrapped.spec.id == REACH
+
+
+def test_minari_recovers_a_task_that_was_registered_by_class(tmp_path, monkeypatch):
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("h5py")
+    pytest.importorskip("jax")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    rigid_env.register_task("mine/Slide-v0", Slide)
+    env = minari.DataCollector(gym.make("mine/Slide-v0", max_episode_steps=3))
+    env.reset(seed=0)
+    while not env.step(env.action_space.sample())[3]:
+        pass
+    env.create_dataset("mine/slide/random-v0", algorithm_name="random")
+    again = minari.load_dataset("mine/slide/random-v0").recover_environment()
+    del gym.registry["mine/Slide-v0"]
+    assert type(again.unwrapped.task) is Slide
