@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from physics.parallel.exclusive import Exclusive, exclusive, in_use
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs.arguments import CommonArguments, TaskArgument
+from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
 from rigid_env.envs.plain import PlainSpec
@@ -34,7 +35,7 @@ class _Arguments(CommonArguments, TaskArgument):
     pass
 
 
-class RigidEnv(Exclusive, PlainSpec, gym.Env[Obs, NDArray[Any]]):
+class RigidEnv(Exclusive, PlainSpec, EpisodeParameters, gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters
