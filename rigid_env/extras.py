@@ -26,6 +26,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "view": {"viser": "viser"},
     "ray": {"ray": "Ray"},
     "submitit": {"submitit": "submitit"},
+    "pettingzoo": {"pettingzoo": "PettingZoo"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
@@ -45,7 +46,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
     Parameters
     ----------
-    extra : {"render", "plot", "view", "agents", "ray", "submitit", "bench", "peers"}
+    extra : {"render", "plot", "view", "agents", "ray", "submitit", "pettingzoo", "bench", "peers"}
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str

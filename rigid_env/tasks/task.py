@@ -21,7 +21,7 @@ from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
+from rigid_env.tasks.declaration_checks import check_class, check_views, checked_limit, refuse_same_keys
 from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
@@ -81,8 +81,9 @@ class Task(Starts):
         Declared by the subclass.
     actions : sequence of Wrench, Force and Impulse
         Declared: who is acted upon and how.
-    observation : sequence of Entry
-        Declared: `rigid_env.observe` has the usual ones.
+    observation : sequence of Entry, or mapping of str to such
+        Declared: `rigid_env.observe` has the usual ones. A mapping has the entries that each agent sees; the agents are
+        those of `actions`.
     draws : mapping of str to Distribution, number or pair
         Declared: what each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``, ``restitution`` and
         ``gravity`` are given to the world (``mass[1]``: to body 1 alone), the rest is for the task's functions.
@@ -131,6 +132,7 @@ class Task(Starts):
         self.episodes.varying |= self._unlike_scene()
         self._table = ActionTable(self.actions, self.world.body_count)
         self.observed = Observation(self.observation)
+        check_views(type(self).__name__, self.observed.views, self.agents)
         self.clock, self._began = 0, np.zeros(self.worlds, dtype=np.int64)
         self._allocate()
         disturbances = self.disturbances if isinstance(self.disturbances, (list, tuple)) else (self.disturbances,)

@@ -1,6 +1,6 @@
 """Libraries that train on our environments: each takes some steps on them (docs/libraries.md).
 
-None of them is an extra of ours: a test is skipped where its library is not installed.
+A test is skipped where its library is not installed.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import pytest
 
 import physics
 import rigid_env
+from rigid_env.tasks import Task, Uniform, Wrench, observe
 from tests.tasks.conftest import Slide
 
 REACH = "rigid_env/BlockReach-v0"
@@ -74,6 +75,49 @@ def test_sb3_contrib_trains_on_the_native_batch(name, policy):
 
     model = getattr(contrib, name)(policy, RigidVecEnv(batch("SameStep")), n_steps=16, batch_size=64, device="cpu")
     assert model.learn(128).num_timesteps == 128
+
+
+class TwoPushers(Task):
+    """Bring a block to a place on the floor, by two agents whose forces add up."""
+
+    scene = physics.Scene(
+        bodies=[physics.Block((2, 1, 2), 4.0, pos=(0, 0.5, 0))],
+        walls=physics.three_walls(half_width=10.0),
+        effects=[physics.Gravity(), physics.Contact(), physics.Friction(0.3)],
+    )
+    actions = tuple(Wrench(0, force=0.45, torque=0.25, agent=agent) for agent in ("left", "right"))
+    observation = (observe.pos(), observe.linvel(), observe.rotation(), observe.drawn("goal", 2, "m", 5.0))
+    draws = {"goal": Uniform((-4, -4), (4, 4))}  # noqa: RUF012
+    max_episode_steps = 40
+
+    def measure(self, worlds):
+        return {"distance": np.linalg.norm(worlds.drawn["goal"] - worlds.pos[:, 0, ::2], axis=1)}
+
+    def success(self, worlds):
+        return worlds.measured["distance"] < 0.3
+
+    def rewards(self, worlds):
+        return {"near": -0.01 * worlds.measured["distance"], "success": 5.0 * worlds.success}
+
+
+@pytest.mark.parametrize("task", [TwoPushers, REACH])
+@pytest.mark.filterwarnings("error::UserWarning")
+def test_pettingzoo_passes_its_own_tests(task):
+    pytest.importorskip("pettingzoo")
+    from pettingzoo.test import parallel_api_test, parallel_seed_test
+    from pettingzoo.utils import parallel_to_aec
+
+    from rigid_env.envs.pettingzoo import parallel_env
+
+    env = parallel_env(task)
+    parallel_api_test(env, num_cycles=100)
+    parallel_seed_test(lambda: parallel_env(task), num_cycles=50)
+    turns = parallel_to_aec(parallel_env(task))
+    turns.reset(seed=0)
+    for agent in turns.agent_iter(max_iter=3):
+        turns.step(turns.action_space(agent).sample())
+    assert env.num_agents == len(env.agents)
+    assert env.max_num_agents == (2 if task is TwoPushers else 1)
 
 
 def test_a_minari_data_set_has_the_bits_of_the_episodes(tmp_path, monkeypatch):
