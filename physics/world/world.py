@@ -58,7 +58,8 @@ class World(Touching):
     Attributes
     ----------
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
-        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+        Read-only views in the world frame, refreshed in place by every step; copy them to keep them. PyTorch writes
+        into read-only memory: ``torch.tensor`` makes a copy that is safe, ``torch.from_numpy`` does not.
     time : float
         Time since the start [s].
 
