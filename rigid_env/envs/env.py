@@ -145,8 +145,7 @@ class RigidEnv(Exclusive, PlainSpec, EpisodeParameters, gym.Env[Obs, NDArray[Any
         truncated : bool
             Always False: the time limit is `gymnasium.make`'s.
         info : dict
-            Numbers of the step, and values drawn for the episode, except those that `effects` take the place of. Arrays
-            of drawn values are read-only: the infos of an episode share them.
+            Numbers of the step, and values drawn for the episode, except those that `effects` take the place of.
 
         Raises
         ------
@@ -163,7 +162,9 @@ class RigidEnv(Exclusive, PlainSpec, EpisodeParameters, gym.Env[Obs, NDArray[Any
             if not self._has_reset:
                 raise self._not_ready("step")
             task = self.task
-            task.apply(shaped(action, self._action_shape, "action"))
+            if type(action) is not np.ndarray or action.shape != self._action_shape:
+                action = shaped(action, self._action_shape, "action")
+            task.apply(action)
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":

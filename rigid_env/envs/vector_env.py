@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from physics.parallel.exclusive import Exclusive, exclusive
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs import vector_arguments as arguments
-from rigid_env.envs import vector_infos
 from rigid_env.envs.arguments import TaskArgument, VectorArguments
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
@@ -23,6 +22,7 @@ from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.plain import PlainSpec
 from rigid_env.envs.sources import Obs, make_source
 from rigid_env.envs.spaces import action_space
+from rigid_env.envs.vector_infos import BatchInfos
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
@@ -74,6 +74,7 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
         self.task = task = given.task
         self._source: Any = make_source(task, given)
         self.contact_infos = contact_infos(task, given.contacts, given.impacts)
+        self._infos = BatchInfos(task, self.contact_infos)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(given.autoreset_mode)
@@ -143,7 +144,7 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
             self._begin(rows, options)
         self._waiting[rows] = False
         self._show()
-        return self._source.all(), vector_infos.of_outcomes(self.task, mask, self.contact_infos)
+        return self._source.all(), self._infos(mask)
 
     @exclusive
     def step(self, actions: ArrayLike) -> Step[Obs]:
@@ -160,8 +161,8 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
         terminations, truncations : (num_envs,) bool
         infos : dict of arrays
             Numbers of the step, and values drawn for the running episodes, except those that `effects` take the place
-            of. Arrays of drawn values, and the mask of all keys, are read-only: infos share them. In mode ``SameStep``
-            also ``final_obs`` and ``final_info`` of the episodes that ended.
+            of. The mask of all keys is one array, which is read-only. In mode ``SameStep`` also ``final_obs`` and
+            ``final_info`` of the episodes that ended.
 
         Raises
         ------
@@ -202,14 +203,13 @@ class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = vector_infos.of_ended(task, self._source, self._ended, self.contact_infos)
+                finals = self._infos.of_ended(self._source, self._ended)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
         self._show()
-        infos = vector_infos.of_outcomes(task, contacts=self.contact_infos)
-        return self._source.all(), rewards, terminations, truncations, {**infos, **finals}
+        return self._source.all(), rewards, terminations, truncations, {**self._infos(), **finals}
 
     @exclusive
     def get_state(self, worlds: ArrayLike | None = None) -> TaskState:

@@ -51,8 +51,8 @@ class Draws:
         Uniform numbers that an episode takes.
     held : dict of str to (worlds,) or (worlds, k) float64
         Values that are held, in place of draws.
-    told : dict of str to (worlds,) or (worlds, k) float64, or None
-        Of `tell`; None after a change.
+    changes : int
+        Times that `now` changed, for copies of it.
     varying : set of str
         Physical parameters that the world is told of at the start of an episode; the others never differ from its
         scene.
@@ -73,7 +73,7 @@ class Draws:
             shares[:, self._places[name]] = self.rehearsal()[:, self._places[name]]
         middle = self.draw(np.arange(worlds), shares, {})
         self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
-        self.told: dict[str, np.ndarray] | None = None
+        self.changes = 0
 
     def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Draw values of new episodes, without changing the present ones.
@@ -108,14 +108,6 @@ class Draws:
                     self._check(name, values[name], len(rows))
         return values
 
-    def tell(self) -> dict[str, np.ndarray]:
-        """Read-only copies of `now` for infos: the same ones until a value changes."""
-        if self.told is None:
-            self.told = {name: values.copy() for name, values in self.now.items()}
-            for values in self.told.values():
-                values.flags.writeable = False
-        return self.told
-
     def rehearsal(self) -> np.ndarray:
         """Fixed uniform numbers (1, uniforms) of an episode, for values before the first one."""
         return np.random.default_rng(SEED).random((1, self.uniforms))
@@ -133,7 +125,7 @@ class Draws:
 
     def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
         """Store the values of new episodes."""
-        self.told = None
+        self.changes += 1
         for name, value in values.items():
             self.now[name][rows] = value
         self.varying.update(name for name in self.parameters if name in options)
@@ -145,7 +137,7 @@ class Draws:
             return
         self.held[name] = np.array(values)
         if name in self.parameters:
-            self.told = None
+            self.changes += 1
             self.now[name][...] = values
             self.varying.add(name)
 
