@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from physics import validation
 from physics.annotations import Preset, SchemeName
 from physics.html_table import fields_table
 from physics.kernels.flight import integrators
-from physics.keywords import known_keywords
+from physics.keywords import known_keywords, nearest_first
 
 # Values of `Accuracy.scheme` and their codes: 0 is time stepping with the exact flow, -1 stepping to a tolerance.
 EVENTS = -1
@@ -122,13 +123,31 @@ PRESETS: dict[Preset, Accuracy] = {
     "reference": replace(_BALANCED, scheme="events", tolerance=1e-13, iterations=10_000, impacts=100_000, slop=1e-14),
 }
 
+AccuracyArgument = Preset | Accuracy | Mapping[str, Any]
+"""Type of an argument: a preset, settings, or a mapping of those that differ from ``preset`` (``balanced``)."""
 
-def resolve(accuracy: Preset | Accuracy, field: str = "accuracy") -> Accuracy:
-    """Return `accuracy` itself if it is an `Accuracy`, else the preset of this name.
+
+def resolve(accuracy: AccuracyArgument, field: str = "accuracy") -> Accuracy:
+    """Return `accuracy` itself if it is an `Accuracy`, else that of a preset's name or of a mapping of settings.
 
     Any other value is a ValueError, whose message calls the argument `field` and lists the presets.
     """
     if isinstance(accuracy, Accuracy):
         return accuracy
+    if isinstance(accuracy, Mapping):
+        return _from_mapping(accuracy, field)
     known: Any = PRESETS
-    return known[validation.one_of(accuracy, PRESETS, field, ", or a physics.Accuracy(...)")]
+    return known[validation.one_of(accuracy, PRESETS, field, ", a dict of settings, or a physics.Accuracy(...)")]
+
+
+def _from_mapping(given: Mapping[str, Any], field: str) -> Accuracy:
+    known = ("preset", *(each.name for each in fields(Accuracy)))
+    for name in given:
+        if name not in known:
+            allowed = ", ".join(nearest_first(name, known))
+            raise ValueError(f"{field} has {name!r}; allowed are {allowed}")
+    settings = dict(given)
+    presets: Any = PRESETS
+    return replace(
+        presets[validation.one_of(settings.pop("preset", "balanced"), PRESETS, f"{field} preset")], **settings
+    )

@@ -27,6 +27,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "ray": {"ray": "Ray", "pandas": "pandas", "pyarrow": "pyarrow"},
     "submitit": {"submitit": "submitit"},
     "minari": {"minari": "Minari", "h5py": "h5py"},
+    "pettingzoo": {"pettingzoo": "PettingZoo"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},
 }
@@ -45,7 +46,7 @@ def require(extra: str, *modules: str, purpose: str = "this command") -> None:
 
     Parameters
     ----------
-    extra : {"render", "plot", "view", "agents", "ray", "submitit", "minari", "bench", "peers"}
+    extra : {"render", "plot", "view", "agents", "ray", "submitit", "minari", "pettingzoo", "bench", "peers"}
     *modules : str
         Names as imported; the default is all of `EXTRAS[extra]`.
     purpose : str

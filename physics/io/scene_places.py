@@ -13,7 +13,35 @@ import re
 HEADER = re.compile(r"\s*\[\[?\s*[A-Za-z_\"'][^,]*\]\s*(#.*)?$")
 
 
-class SourceLines:
+class Places:
+    """Places in a scene's plain data, for errors: names of lists and tables, and indices.
+
+    Parameters
+    ----------
+    source : str
+        Name of the data in messages; "": nothing stands in front.
+    """
+
+    def __init__(self, source: str = ""):
+        self._source = source
+
+    def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
+        """An error about a key of the table number `index` of the list `name`, or of the head (None)."""
+        return self._told(message if name is None else f"{name}[{index}]: {message}")
+
+    def error_in_table(self, name: str, key: str | None, message: str) -> ValueError:
+        """An error about a key of the table `name`, such as ``environment.goal``, or about the table."""
+        return self._told(f"{name}: {message}")
+
+    def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
+        """An error about the whole scene."""
+        return self._told(message)
+
+    def _told(self, message: str) -> ValueError:
+        return ValueError(f"{self._source}: {message}" if self._source else message)
+
+
+class SourceLines(Places):
     """Text of a scene file in which errors find their lines.
 
     Parameters
@@ -25,8 +53,8 @@ class SourceLines:
     """
 
     def __init__(self, text: str, source: str):
+        super().__init__(source)
         self._lines = text.splitlines()
-        self._source = source
 
     def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
         """Make an error about a key of the table [[name]] number `index`; `name` None: of the head of the file.
@@ -70,7 +98,7 @@ class SourceLines:
         if found:
             last = len(names) - 1 - names[::-1].index(min(found)[1])
             return self._error_at("effects", last, message)
-        return ValueError(f"{self._source}: {message}")
+        return self._told(message)
 
     def _error_at(self, name: str, index: int, message: str) -> ValueError:
         line = self._table_line(name, index) or self._key_line(0, name) or 1

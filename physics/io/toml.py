@@ -11,21 +11,19 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from dataclasses import MISSING, dataclass, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from physics import validation
-from physics.io.scene_places import SourceLines
+from physics.io.plain import KINDS, build_all, plain_scene
+from physics.io.scene_places import Places, SourceLines
 from physics.keywords import known_keywords, nearest_first
-from physics.scene.bodies import Block, Ellipsoid, Hull, Sphere
-from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field
-from physics.scene.force_fields import FIELDS
-from physics.scene.scene import HalfSpace, Scene
+from physics.scene.scene import Scene
 from physics.summary import shown
 
 if sys.version_info >= (3, 11):
@@ -36,11 +34,7 @@ else:
 # Number of the file format; a reader refuses newer formats than its own.
 FORMAT = 1
 
-BODIES = (Block, Sphere, Ellipsoid, Hull)
-EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
-LISTS = ("bodies", "walls", "effects")
-
-# Names of tables that are no part of a scene; they are read for the programs that use them.
+# Tables that are no part of a scene: read, but left to the programs that know them.
 OTHERS = ("environment",)
 
 
@@ -53,14 +47,14 @@ class SceneFile:
     scene : Scene
         Scene of the file.
     others : dict of str to dict
-        Tables of the file that are named in `OTHERS`, unchecked.
-    lines : SourceLines
+        Tables of `OTHERS` that the file has, with what stands in them, unchecked.
+    places : Places
         Lines of the file, for errors about these tables.
     """
 
     scene: Scene
     others: dict[str, dict[str, Any]]
-    lines: SourceLines
+    places: Places
 
 
 def save_scene(scene: Scene, path: str | Path) -> None:
@@ -85,32 +79,15 @@ def to_toml(scene: Scene) -> str:
     document = tomlkit.document()
     document.add(tomlkit.comment("Metres, kilograms, seconds, radians; quaternions (w, x, y, z), body to world."))
     document.add("format", FORMAT)
-    for name in LISTS:
+    for name, items in plain_scene(scene).items():
         tables = tomlkit.aot()
-        for item in getattr(scene, name):
+        for item in items:
             table = tomlkit.table()
-            if name != "walls":
-                table.add("kind", type(item).__name__)
-            for key, value in _parameters(item).items():
+            for key, value in item.items():
                 table.add(key, value)
             tables.append(table)
-        if len(tables):
-            document.add(name, tables)
+        document.add(name, tables)
     return tomlkit.dumps(document)
-
-
-def _parameters(item) -> dict:
-    """Parameters of a body, wall or effect that differ from their defaults, by name; tuples become lists."""
-    found = {}
-    for field in fields(item):
-        value = getattr(item, field.name)
-        if field.default is MISSING or value != field.default:
-            found[field.name] = _plain(value)
-    return found
-
-
-def _plain(value):
-    return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
 
 @known_keywords
@@ -162,30 +139,34 @@ def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(_syntax_error(text, source, str(error))) from None
-    lines = SourceLines(text, source)
-    _check_head(lines, content)
-    known = {"bodies": BODIES, "walls": (HalfSpace,), "effects": (*EFFECTS, *kinds)}
-    lists = {name: _build_all(lines, name, content.get(name, []), known[name]) for name in LISTS}
+    return file_from_content(content, SourceLines(text, source), kinds)
+
+
+def file_from_content(content: Mapping[str, Any], places: Places, kinds: Sequence[type[Field]] = ()) -> SceneFile:
+    """Read all of a scene file's content, plain data; `places` makes the errors about it."""
+    _check_head(places, content)
+    known = {**KINDS, "effects": (*KINDS["effects"], *kinds)}
+    lists = {name: build_all(places, name, content.get(name, []), known[name]) for name in KINDS}
     try:
         scene = Scene(**lists)
     except ValueError as error:
-        raise lines.error_of_scene(lists, str(error)) from None
-    return SceneFile(scene, {name: content[name] for name in OTHERS if name in content}, lines)
+        raise places.error_of_scene(lists, str(error)) from None
+    return SceneFile(scene, {name: content[name] for name in OTHERS if name in content}, places)
 
 
-def _check_head(lines: SourceLines, content: dict) -> None:
-    """Refuse a file with unknown keys or tables at its top level, or with a newer format."""
-    known = ("format", *LISTS, *OTHERS)
+def _check_head(places: Places, content: Mapping[str, Any]) -> None:
+    """Refuse unknown keys and tables of a file's head, and formats that are newer than this reader."""
+    known = ("format", *KINDS, *OTHERS)
     for key in content:
         if key not in known:
             allowed = ", ".join(nearest_first(key, known))
-            raise lines.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
+            raise places.error(None, 0, key, f"{key} is not known; allowed are {allowed}")
     number = content.get("format", FORMAT)
     if type(number) is not int or number not in range(1, FORMAT + 1):
-        raise lines.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
+        raise places.error(None, 0, "format", f"format is {shown(number)}; allowed is {FORMAT}")
     for name in OTHERS:
-        if not isinstance(content.get(name, {}), dict):
-            raise lines.error(None, 0, name, f"{name} is {shown(content[name])}; allowed is a table [{name}]")
+        if not isinstance(content.get(name, {}), Mapping):
+            raise places.error(None, 0, name, f"{name} is {shown(content[name])}; allowed is a table [{name}]")
 
 
 def _own_kinds(kinds) -> tuple:
@@ -207,38 +188,3 @@ def _syntax_error(text: str, source: str, message: str) -> str:
     place = f"line {line}" + (f", column {told.group(3)}" if told.group(3) else ", at its end")
     stands = shown(lines[line - 1].strip()) if line <= len(lines) else "''"
     return f"{source}, {place}: {told.group(1)}, in {stands}; allowed is TOML, as `physics.save_scene` writes it"
-
-
-def _build_all(lines: SourceLines, name: str, tables, known: tuple[type, ...]) -> list:
-    """Make the bodies, walls or effects (`name`) of a file from their tables; `known` are the allowed classes."""
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise lines.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
-    return [_build(lines, name, k, dict(table), known) for k, table in enumerate(tables)]
-
-
-def _build(lines: SourceLines, name: str, index: int, table: dict, known: tuple[type, ...]):
-    kinds = {kind.__name__: kind for kind in known}
-    if len(known) == 1:
-        chosen = next(iter(kinds))
-    elif "kind" in table:
-        chosen = table.pop("kind")
-    else:
-        raise lines.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
-    if not isinstance(chosen, str) or chosen not in kinds:
-        allowed = ", ".join(nearest_first(chosen, kinds) if isinstance(chosen, str) else kinds)
-        raise lines.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
-    kind = kinds[chosen]
-    parameters = {field.name: field for field in fields(kind) if field.init}
-    for key in table:
-        if key not in parameters:
-            allowed = ", ".join(nearest_first(key, parameters))
-            raise lines.error(name, index, key, f"{key} is not known; allowed are {allowed}")
-    for key, field in parameters.items():
-        if field.default is MISSING and field.default_factory is MISSING and key not in table:
-            raise lines.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
-    try:
-        return kind(**table)
-    except (ValueError, TypeError) as error:
-        told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
-        key = told.group(1) if told and told.group(1) in parameters else None
-        raise lines.error(name, index, key, str(error)) from None

@@ -75,7 +75,8 @@ class Batch(Exclusive):
     dt, time : float
         Length of a step, and time since the start [s].
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
-        Read-only views of `state` in the world frame, refreshed in place by every step; copy them to keep them.
+        Read-only views of `state` in the world frame, refreshed in place by every step; copy them to keep them. PyTorch
+        writes into read-only memory: ``torch.tensor`` makes a copy that is safe, ``torch.from_numpy`` does not.
     state : (worlds * bodies, STATE_SIZE) float64
         States of all bodies, a row for each; columns in `physics.kernels.state.layout`.
     params : (worlds * bodies, PARAM_SIZE + columns of fields and laws) float64

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.accuracy import PRESETS, Accuracy, resolve
-from physics.annotations import Preset
+from physics.accuracy import PRESETS, AccuracyArgument, resolve
 from physics.html_table import parts_table
 from physics.kernels.forces.force_field_dispatch import register_terms
 from physics.kernels.state import layout as at
@@ -50,8 +49,9 @@ class World(Touching):
         Number of worlds of the batch.
     dt : float
         Length of a step [s].
-    accuracy : str or Accuracy
-        ``fast``, ``balanced``, ``precise``, ``reference``, or a `physics.Accuracy`.
+    accuracy : str, Accuracy or mapping
+        ``fast``, ``balanced``, ``precise``, ``reference``, a `physics.Accuracy`, or a mapping of its settings that
+        differ from the preset under the key ``preset`` (``balanced``), such as ``{"tolerance": 1e-3}``.
     threads : int
         Threads that share a step, at most as many as processors. Each takes worlds of its own range first, then of the
         ranges of others. Threads wait without sleeping between steps that follow each other within 0.3 ms.
@@ -59,7 +59,8 @@ class World(Touching):
     Attributes
     ----------
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
-        Read-only views in the world frame, refreshed in place by every step; copy them to keep them.
+        Read-only views in the world frame, refreshed in place by every step; copy them to keep them. PyTorch writes
+        into read-only memory: ``torch.tensor`` makes a copy that is safe, ``torch.from_numpy`` does not.
     time : float
         Time since the start [s].
 
@@ -78,7 +79,7 @@ class World(Touching):
         scene: Scene,
         worlds: int = 1,
         dt: float = 0.01,
-        accuracy: Preset | Accuracy = "balanced",
+        accuracy: AccuracyArgument = "balanced",
         threads: int = 1,
     ) -> None:
         validation.instance(scene, Scene, "scene", "a physics.Scene")

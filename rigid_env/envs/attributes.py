@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from physics.keywords import nearest_first
 from rigid_env.envs.sources import Obs
 from rigid_env.envs.vector_arguments import episode_limit
+from rigid_env.tasks import Task
 
 if TYPE_CHECKING:
     T_co = TypeVar("T_co", covariant=True)
@@ -25,14 +26,22 @@ if TYPE_CHECKING:
 
 def _parameter(field: str, what: str) -> property:
     def read(env: Any) -> Any:
+        _require_drawn(env.task, field)
         return value_of(env.task.drawn[field][0])
 
     def write(env: Any, value: Any) -> None:
+        _require_drawn(env.task, field)
         env.task.hold(field, value)
 
     return property(
         read, write, doc=f"{what}; setting it holds from now on, in all later episodes, too. None: draw again."
     )
+
+
+def _require_drawn(task: Task, field: str) -> None:
+    if field not in task.drawn:
+        drawn = ", ".join(nearest_first(field, task.drawn)) or "no attributes of this kind"
+        raise AttributeError(f"{type(task).__name__} does not draw {field!r}; allowed are {drawn}")
 
 
 def value_of(value: Any) -> Any:
@@ -43,7 +52,8 @@ def value_of(value: Any) -> Any:
 class EpisodeParameters:
     """Drawn parameters of a single environment's episode, as attributes that can be read and set.
 
-    Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then.
+    Setting raises a ValueError that names the field, the value and what is allowed; nothing has changed then. A
+    parameter that the task does not draw is an AttributeError.
     """
 
     if TYPE_CHECKING:
@@ -53,8 +63,8 @@ class EpisodeParameters:
         restitution = _Drawn[float]()
         gravity = _Drawn[float]()
     else:
-        mass = _parameter("mass", "Mass of the block [kg]")
-        size = _parameter("size", "Edges of the block (3,) [m]")
+        mass = _parameter("mass", "Mass of the bodies [kg]")
+        size = _parameter("size", "Edges or diameters of the bodies (3,) [m]")
         friction = _parameter("friction", "Coulomb coefficient against the walls")
         restitution = _parameter("restitution", "Restitution against the walls")
         gravity = _parameter("gravity", "Strength of gravity along -y [m/s²]")

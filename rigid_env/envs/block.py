@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from physics import validation
 from rigid_env.envs.arguments import CommonArguments, CountArgument, VectorArguments
-from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
 from rigid_env.tasks.arguments import ControlArguments, part, takes
@@ -26,7 +25,7 @@ class _BatchArguments(ControlArguments, BlockArguments, VectorArguments, CountAr
     pass
 
 
-class BlockEnv(EpisodeParameters, RigidEnv[NDArray[Any]]):
+class BlockEnv(RigidEnv[NDArray[Any]]):
     """A task of the block as a Gymnasium environment; subclasses name the task.
 
     Parameters

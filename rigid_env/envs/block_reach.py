@@ -94,7 +94,7 @@ class BlockReachEnv(BlockEnv):
     `info` holds `is_success`, `distance` [m], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
     `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included. The terms
     of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
-    `reward_success` the bonus. That of `reset` also holds what was drawn for the episode: `place` [m], `yaw` [rad],
+    `reward_success` the bonus. So are the draws of the episode: `place` [m], `yaw` [rad],
     `face`, `goal` [m], and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
     without those that `effects` take the place of.
 
@@ -109,7 +109,7 @@ class BlockReachEnv(BlockEnv):
     | `friction` | 0.5 | Coulomb coefficient against the walls |
     | `restitution` | 0.2 | of the block against the walls |
     | `gravity` | 9.81 | along -y [m/s²] |
-    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `accuracy` | `"balanced"` | preset of the engine, a `physics.Accuracy`, or a dict of its settings |
     | `effects` | () | `physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |

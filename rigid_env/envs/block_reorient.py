@@ -86,7 +86,7 @@ class BlockReorientEnv(BlockEnv):
     `info` holds `is_success`, `angle` [rad], `speed` [m/s], `spin` [rad/s], and `physics_status`, a
     `physics.Status`: 0 when nothing went wrong in the step, contact problems above their tolerance included. The terms
     of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
-    `reward_success` the bonus. That of `reset` also holds what was drawn for the episode: `place` [m], `yaw` [rad],
+    `reward_success` the bonus. So are the draws of the episode: `place` [m], `yaw` [rad],
     `face`, `target_face`, and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
     without those that `effects` take the place of.
 

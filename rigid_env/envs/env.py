@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from physics.parallel.exclusive import Exclusive, exclusive, in_use
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs.arguments import CommonArguments, TaskArgument
-from rigid_env.envs.attributes import value_of
+from rigid_env.envs.attributes import EpisodeParameters
 from rigid_env.envs.goals import lend_goals
 from rigid_env.envs.infos import info_maker
+from rigid_env.envs.plain import PlainSpec
 from rigid_env.envs.sources import Obs, StateSource, make_source
 from rigid_env.envs.spaces import action_space
 from rigid_env.rendering.view import RENDER_MODES, View
@@ -34,7 +35,7 @@ class _Arguments(CommonArguments, TaskArgument):
     pass
 
 
-class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
+class RigidEnv(Exclusive, PlainSpec, EpisodeParameters, gym.Env[Obs, NDArray[Any]]):
     """A `Task` of one world as a Gymnasium environment.
 
     Parameters
@@ -104,7 +105,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         -------
         observation : (entries,) float32
         info : dict
-            As of `step`, and the drawn values of the episode, by name, without parameters that `effects` fix.
+            As of `step`.
 
         Raises
         ------
@@ -119,10 +120,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         self._has_reset, self._is_closed = True, False
         if self.render_mode == "human":
             self.render()
-        values = self.task.drawn
-        drawn = {name: value_of(values[name][0]) for name in self.task.own_draws}
-        info = self._info(self.task.outcome[0].tolist(), self.task.status.item())
-        return self._source.one(0), {**info, **drawn}
+        return self._source.one(0), self._info(self.task.outcome[0].tolist(), self.task.status.item())
 
     def _remember_generator(self) -> Undo:
         kept = self._np_random, self._np_random_seed, self.task.generators[0]
@@ -149,6 +147,7 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
         truncated : bool
             Always False; the time limit is a wrapper of `gymnasium.make`.
         info : dict
+            Numbers of the step, and values drawn for the episode, except those that `effects` take the place of.
 
         Raises
         ------
@@ -165,7 +164,9 @@ class RigidEnv(Exclusive, gym.Env[Obs, NDArray[Any]]):
             if not self._has_reset:
                 raise self._not_ready("step")
             task = self.task
-            task.apply(shaped(action, self._action_shape, "action"))
+            if type(action) is not np.ndarray or action.shape != self._action_shape:
+                action = shaped(action, self._action_shape, "action")
+            task.apply(action)
             (outcome,) = task.outcome.tolist()  # one world: cheaper than the row of an array
             info = self._info(outcome, task.status.item())
             if self.render_mode == "human":

@@ -72,9 +72,12 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
     id : str
         Id such as ``mine/EdgeBalance-v0``.
     task : class of Task, or str
-        Class, or its name ``module:Class``, by which newly started worker processes can import it.
+        The class, or where it stands, ``module:Class``: workers that start afresh import it from there. The spec keeps
+        this place of a class that can be imported. One of ``__main__`` or of a function stays a class, and its spec
+        cannot become JSON.
     settings
-        Default arguments of the task, such as ``accuracy``, and of its environment.
+        Arguments of the task, such as ``accuracy``, and of its environment, in place of their defaults. The spec keeps
+        them as plain data.
 
     Raises
     ------
@@ -84,6 +87,7 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
         `task` is no task.
     """
     from rigid_env.envs.making import check_settings, task_class
+    from rigid_env.envs.plain import plain_settings
     from rigid_env.tasks.declaration_checks import checked_limit
 
     kind = task_class(task)
@@ -94,5 +98,5 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
         entry_point="rigid_env.envs.task:TaskEnv",
         vector_entry_point="rigid_env.envs.task:TaskVectorEnv",
         max_episode_steps=kind.max_episode_steps,
-        kwargs={"task": task, **settings},
+        kwargs=plain_settings({"task": task, **settings}),
     )

@@ -29,10 +29,11 @@ except ImportError:
 class RigidVecEnv(VecEnv):
     """A `RigidVectorEnv` with the interface of Stable-Baselines3's vector environments.
 
-    A world restarts in the step in which its episode ends. The info of that step has ``terminal_observation``,
-    ``TimeLimit.truncated``, the numbers of the task's infos, and, with `monitor`, ``episode`` (return ``r``, length
-    ``l``, seconds since the start of training ``t``). Other infos are empty. `reset_infos` has the infos from the
-    starts of the running episodes, with their drawn values, such as ``mass`` and ``friction``.
+    Worlds start anew in the step in which their episode ends; the info of that step holds
+    ``terminal_observation``, ``TimeLimit.truncated``, the numbers of the task's infos and draws, and, with `monitor`,
+    ``episode`` (return ``r``, length ``l``, seconds since the start of training ``t``).
+    The other infos are empty. `reset_infos` holds the infos of the starts of the running episodes, with the parameters
+    of each (``mass``, ``size``, ``friction``, ``restitution``, ``gravity``).
 
     Parameters
     ----------
@@ -196,9 +197,8 @@ class RigidVecEnv(VecEnv):
         return info
 
     def _row_of(self, infos: dict[str, Any], world: int) -> dict[str, Any]:
-        """Info of one world at the start of its episode, taken from the infos of the batch."""
-        keys = (*self._keys(), *self.vector_env.task.own_draws)
-        return {key: infos[key][world].tolist() for key in keys}
+        """One world's info at the start of its episode."""
+        return {key: infos[key][world].tolist() for key in self._keys()}
 
     def _keys(self) -> tuple[str, ...]:
         """Keys of every info."""

@@ -113,14 +113,14 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     `info` holds `is_success` and `physics_status`, a `physics.Status`: 0 when nothing went wrong in the step,
     contact problems above their tolerance included. With a goal also `distance` [m], `speed` [m/s], and the
-    terms of the reward, `reward_progress` and `reward_success`. That of `reset` also holds what was drawn:
+    terms of the reward, `reward_progress` and `reward_success`, are in it. So are the draws of the episode:
     `goal`, `start_pos`, `start_linvel`, `start_angvel`.
 
     ## Arguments
 
     | Argument | Default | Meaning |
     | --- | --- | --- |
-    | `scene` | None | scene file (.toml, .xml, .urdf), name of a canonical scene, or `physics.Scene`; must be given |
+    | `scene` | None | scene file (.toml, .xml, .urdf) or its content, canonical scene, or `physics.Scene`; needed |
     | `driven` | None | names or indices of driven bodies; with one body in the scene that one |
     | `force` | None | longest force over the body's weight (0.9) |
     | `torque` | None | longest torque over weight times reach (0.5) |
@@ -131,7 +131,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     | `frame_skip` | None | physics steps per control step (5) |
     | `dt` | None | physics step (0.005) [s] |
     | `episode_steps` | None | control steps after which an episode is truncated, for the file's `max_episode_steps` |
-    | `accuracy` | `"balanced"` | preset of the engine, or a `physics.Accuracy` |
+    | `accuracy` | `"balanced"` | preset of the engine, a `physics.Accuracy`, or a dict of its settings |
     | `effects` | () | `physics` effects besides, or instead of the scene's of that class |
     | `dump_faults` | None | folder for what led to a state that was not finite (`rigid-env replay`) |
     | `threads` | 1 | threads that share a step of a batch; a single environment has one world, and one thread |
@@ -178,7 +178,7 @@ class SceneVectorEnv(RigidVectorEnv[NDArray[Any]]):
     Parameters
     ----------
     num_envs : int
-    scene : physics.Scene, str or Path
+    scene : physics.Scene, str, Path or mapping
     autoreset_mode, max_episode_steps, render_mode, width, height, camera, arrows, obs, obs_size, obs_stack,
     contacts, impacts
         As of `RigidVectorEnv`; `max_episode_steps` is `episode_steps` by default, and at most that.

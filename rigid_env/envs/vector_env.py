@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from physics.parallel.exclusive import Exclusive, exclusive
 from physics.undo import Undo, undo_on_error
 from rigid_env.envs import vector_arguments as arguments
-from rigid_env.envs import vector_infos
 from rigid_env.envs.arguments import TaskArgument, VectorArguments
 from rigid_env.envs.attributes import BatchAttributes
 from rigid_env.envs.contact_infos import contact_infos
 from rigid_env.envs.goals import lend_goals
+from rigid_env.envs.plain import PlainSpec
 from rigid_env.envs.sources import Obs, make_source
 from rigid_env.envs.spaces import action_space
+from rigid_env.envs.vector_infos import BatchInfos
 from rigid_env.rendering.view import RENDER_MODES, View
 from rigid_env.tasks import Task
 from rigid_env.tasks import layout as col
@@ -39,7 +40,7 @@ class _Arguments(VectorArguments, TaskArgument):
     pass
 
 
-class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
+class RigidVectorEnv(Exclusive, PlainSpec, BatchAttributes[Obs]):
     """A `Task` as a Gymnasium vector environment.
 
     World i has the same bits as a single environment with the same seed, for any number of worlds.
@@ -73,6 +74,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         self.task = task = given.task
         self._source: Any = make_source(task, given)
         self.contact_infos = contact_infos(task, given.contacts, given.impacts)
+        self._infos = BatchInfos(task, self.contact_infos)
         lend_goals(task, self)
         self.num_envs = num_envs = task.worlds
         self.autoreset_mode = arguments.autoreset_mode(given.autoreset_mode)
@@ -121,7 +123,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         -------
         observations : (num_envs, entries) float32
         infos : dict of arrays
-            As of `step`, with the drawn values of the new episodes, by name, without parameters that `effects` fix.
+            As of `step`; zero in worlds that are not reset.
 
         Raises
         ------
@@ -142,9 +144,7 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
             self._begin(rows, options)
         self._waiting[rows] = False
         self._show()
-        infos = vector_infos.of_outcomes(self.task, mask, self.contact_infos)
-        vector_infos.add_drawn(infos, self.task, rows)
-        return self._source.all(), infos
+        return self._source.all(), self._infos(mask)
 
     @exclusive
     def step(self, actions: ArrayLike) -> Step[Obs]:
@@ -160,8 +160,9 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         rewards : (num_envs,) float64
         terminations, truncations : (num_envs,) bool
         infos : dict of arrays
-            In mode ``SameStep`` it has ``final_obs`` and ``final_info`` of the episodes that ended. In both modes with
-            automatic resets it has the drawn values of the episodes that begin in this step, like that of `reset`.
+            Numbers of the step, and values drawn for the running episodes, except those that `effects` take the place
+            of. The mask of all keys is one array, which is read-only. In mode ``SameStep`` also ``final_obs`` and
+            ``final_info`` of the episodes that ended.
 
         Raises
         ------
@@ -202,15 +203,13 @@ class RigidVectorEnv(Exclusive, BatchAttributes[Obs]):
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             rows = np.flatnonzero(self._ended)
             if len(rows):
-                finals = vector_infos.of_ended(task, self._source, self._ended, self.contact_infos)
+                finals = self._infos.of_ended(self._source, self._ended)
         if self.autoreset_mode is not AutoresetMode.DISABLED and len(rows):
             ended = self._ended
             self._begin(rows, {})
             self._ended = ended & (self.autoreset_mode is AutoresetMode.NEXT_STEP)
-            vector_infos.add_drawn(finals, task, rows)
         self._show()
-        infos = vector_infos.of_outcomes(task, contacts=self.contact_infos)
-        return self._source.all(), rewards, terminations, truncations, {**infos, **finals}
+        return self._source.all(), rewards, terminations, truncations, {**self._infos(), **finals}
 
     @exclusive
     def get_state(self, worlds: ArrayLike | None = None) -> TaskState:

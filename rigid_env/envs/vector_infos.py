@@ -12,47 +12,62 @@ from rigid_env.tasks import layout as col
 
 
 def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
-    """Keys of the infos of every step and start."""
-    return ("is_success", *task.info_names, "physics_status", *(() if contacts is None else contacts.keys))
+    """Keys of every info, of a step and of a start."""
+    told = () if contacts is None else contacts.keys
+    return ("is_success", *task.info_names, "physics_status", *told, *task.own_draws)
 
 
-def of_outcomes(task: Task, mask: np.ndarray | None = None, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """Infos of the last step or start, with zeros for worlds outside of `mask` (worlds,) bool."""
-    outcome = task.outcome
-    infos = {"is_success": outcome[:, col.SUCCESS] > 0.0}
-    for column, name in enumerate(task.info_names, col.INFO):
-        infos[name] = outcome[:, column].copy()
-    infos["physics_status"] = task.status.copy()
-    if contacts is not None:
-        infos.update(contacts.all())
-    if mask is None:
-        mask = np.ones(task.worlds, dtype=np.bool_)
-    else:
-        for values in infos.values():
-            values[~mask] = 0
-    infos.update({f"_{key}": mask.copy() for key in tuple(infos)})
-    return infos
+class BatchInfos:
+    """Maker of the infos of a batch. All arrays are new in each info; its keys share one mask, which is read-only.
 
+    Numbers of one kind are rows of one array, so that few arrays need memory: a batch of few worlds takes as long for
+    memory as for anything else in an info.
 
-def add_drawn(infos: dict[str, Any], task: Task, rows: np.ndarray) -> None:
-    """Add the drawn values of episodes that begin in the worlds `rows` (n,) to infos, with zeros for other worlds."""
-    mask = np.zeros(task.worlds, dtype=np.bool_)
-    mask[rows] = True
-    for name in task.own_draws:
-        now = task.drawn[name]
-        told = np.zeros_like(now)
-        told[rows] = now[rows]
-        infos[name], infos[f"_{name}"] = told, mask.copy()
+    Parameters
+    ----------
+    task : Task
+    contacts : ContactInfos or None
+    """
 
+    def __init__(self, task: Task, contacts: ContactInfos | None):
+        self._task, self._contacts = task, contacts
+        self._numbers = [name for name in task.own_draws if task.drawn[name].ndim == 1]
+        self._rows = [name for name in task.own_draws if task.drawn[name].ndim > 1]
+        self._changes, self._drawn = -1, np.empty((0, task.worlds))
+        self._masks = tuple(f"_{key}" for key in keys(task, contacts))
+        self._all = np.ones(task.worlds, dtype=np.bool_)
 
-def of_ended(task: Task, source, mask: np.ndarray, contacts: ContactInfos | None = None) -> dict[str, Any]:
-    """Make `final_obs` and `final_info` of the episodes that end where `mask` is True, before they restart."""
-    final_obs = np.full(task.worlds, None, dtype=object)
-    for i in np.flatnonzero(mask):
-        final_obs[i] = source.one(i)
-    return {
-        "final_obs": final_obs,
-        "_final_obs": mask.copy(),
-        "final_info": of_outcomes(task, mask, contacts),
-        "_final_info": mask.copy(),
-    }
+    def __call__(self, mask: np.ndarray | None = None) -> dict[str, Any]:
+        """Infos of the last step or start for the worlds of `mask` (worlds,) bool; zero in the others."""
+        task = self._task
+        outcome, drawn = task.outcome.T.copy(), task.drawn
+        infos = {"is_success": outcome[col.SUCCESS] > 0.0}
+        infos.update(zip(task.info_names, outcome[col.INFO :]))
+        infos["physics_status"] = task.status.copy()
+        if self._contacts is not None:
+            infos.update(self._contacts.all())
+        if self._changes != task.episodes.changes:
+            self._changes = task.episodes.changes
+            self._drawn = np.array([drawn[name] for name in self._numbers])
+        infos.update(zip(self._numbers, self._drawn.copy()))
+        for name in self._rows:
+            infos[name] = drawn[name].copy()
+        if mask is not None:
+            for values in infos.values():
+                values[~mask] = 0
+        mask = (self._all if mask is None else mask).copy()
+        mask.flags.writeable = False
+        infos.update(dict.fromkeys(self._masks, mask))
+        return infos
+
+    def of_ended(self, source, mask: np.ndarray) -> dict[str, Any]:
+        """`final_obs` and `final_info` of episodes that end where `mask` is True, taken before they restart."""
+        final_obs = np.full(len(mask), None, dtype=object)
+        for i in np.flatnonzero(mask):
+            final_obs[i] = source.one(i)
+        return {
+            "final_obs": final_obs,
+            "_final_obs": mask.copy(),
+            "final_info": self(mask),
+            "_final_info": mask.copy(),
+        }

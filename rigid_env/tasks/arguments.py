@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar, get_type_hints
 
-import physics
-from physics.annotations import Effect, Preset
+from physics.accuracy import AccuracyArgument
+from physics.annotations import Effect
 
 P = ParamSpec("P")
 Made = TypeVar("Made")
@@ -64,8 +64,8 @@ class BatchArguments:
 class EngineArguments:
     """Arguments that the world of every task takes; see `rigid_env.Task`."""
 
-    accuracy: Preset | physics.Accuracy = "balanced"
-    effects: Iterable[Effect] = ()
+    accuracy: AccuracyArgument = "balanced"
+    effects: Iterable[Effect | Mapping[str, Any]] = ()
     dump_faults: str | Path | None = None
     threads: int = 1
 

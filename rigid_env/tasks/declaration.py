@@ -10,7 +10,7 @@ import numpy as np
 import physics
 from rigid_env.tasks.actions import Wrench
 from rigid_env.tasks.distribution import Distribution
-from rigid_env.tasks.entries import Entry
+from rigid_env.tasks.entries import Entries
 from rigid_env.tasks.worlds import Worlds
 
 
@@ -38,7 +38,7 @@ class Declaration:
 
     scene: ClassVar[physics.Scene]
     actions: ClassVar[Any] = Wrench()
-    observation: ClassVar[Sequence[Entry]] = ()
+    observation: ClassVar[Entries] = ()
     draws: ClassVar[Mapping[str, Any]] = {}
     memory: ClassVar[Mapping[str, int]] = {}
     disturbances: ClassVar[Sequence] = ()

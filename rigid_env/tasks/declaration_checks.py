@@ -65,6 +65,14 @@ def refuse_same_keys(task: str, names: Iterable[str], drawn: Mapping) -> None:
         raise ValueError(f"info of {task} has {twice[0]!r} twice; allowed are measures, terms and draws of other names")
 
 
+def check_views(task: str, views: Iterable[str], agents: Iterable[str]) -> None:
+    """Raise a ValueError unless `views` of an observation are none, or those of all agents of the actions."""
+    seen, acting = list(views), list(agents)
+    if seen and set(seen) != set(acting):
+        told = f"observation of {task} is of {', '.join(map(repr, seen))}"
+        raise ValueError(f"{told}; allowed are the agents of its actions: {', '.join(map(repr, acting))}")
+
+
 def checked_limit(value: Any, field: str) -> int | None:
     """Most control steps of an episode: an integer of at least 1, or None for no limit; `field` names it in errors."""
     try:

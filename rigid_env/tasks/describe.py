@@ -152,8 +152,16 @@ def _observation(task: Task) -> Section:
     parts = {"": task.observed}
     if isinstance(task, GoalTask):
         parts = {"observation": task.observed, "goal": task.goals}
+    views = task.observed.views
     rows = tuple(
-        (str(k), f"{part}: {name}" if part else name, f"{entry.low:.12g}", f"{entry.high:.12g}", entry.told_unit)
+        (
+            str(k),
+            f"{part}: {name}" if part else name,
+            f"{entry.low:.12g}",
+            f"{entry.high:.12g}",
+            entry.told_unit,
+            *((", ".join(agent for agent, view in views.items() if k in view),) if views else ()),
+        )
         for part, entries in parts.items()
         for k, (name, entry) in enumerate((name, entry) for entry in entries.entries for name in entry.names)
     )
@@ -164,7 +172,8 @@ def _observation(task: Task) -> Section:
             f"{task.goals.size} float32 each."
         )
     text += " Each number is told in its unit and clipped to its bounds."
-    return Section("Observation Space", (text,), ("Num", "Observation", "Min", "Max", "Unit"), rows)
+    columns = ("Num", "Observation", "Min", "Max", "Unit", *(("Agents",) if views else ()))
+    return Section("Observation Space", (text,), columns, rows)
 
 
 def _rewards(task: Task) -> Section:
@@ -183,7 +192,7 @@ def _starts(task: Task) -> Section:
     if rows:
         text = (
             "Each episode draws the values of the table. `reset(options=...)` fixes what it names, for this episode; "
-            "the other draws of a seed stay the same. The `info` of `reset` tells all of them."
+            "the other draws of a seed stay the same. Every `info` tells all of them."
         )
     return Section("Starting State", (*_own_text(task, "place"), text), ("Option", "Drawn", "Numbers", "Meaning"), rows)
 

@@ -56,6 +56,8 @@ class Draws:
         Uniform numbers that an episode takes.
     held : dict of str to (worlds,) or (worlds, k) float64
         Values that new episodes take instead of draws, see `hold`.
+    changes : int
+        Number of times that `now` has changed, by which holders of copies see that theirs are old.
     varying : set of str
         Physical parameters that are written into the world at the start of an episode; all others have the scene's
         values in every episode.
@@ -76,6 +78,7 @@ class Draws:
             shares[:, self._places[name]] = self.rehearsal()[:, self._places[name]]
         middle = self.draw(np.arange(worlds), shares, {})
         self.now = {name: np.array(values, dtype=np.float64) for name, values in middle.items()}
+        self.changes = 0
 
     def draw(self, rows: np.ndarray, shares: np.ndarray, options: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Draw the values of new episodes, and return them; the values of the running episodes stay.
@@ -127,6 +130,7 @@ class Draws:
 
     def begin(self, rows: np.ndarray, values: Mapping[str, np.ndarray], options: Mapping[str, np.ndarray]) -> None:
         """Store the values of episodes that begin in worlds `rows`; `options` has those that options of `reset` fix."""
+        self.changes += 1
         for name, value in values.items():
             self.now[name][rows] = value
         self.varying.update(name for name in self.parameters if name in options)
@@ -147,6 +151,7 @@ class Draws:
             return
         self.held[name] = np.array(values)
         if name in self.parameters:
+            self.changes += 1
             self.now[name][...] = values
             self.varying.add(name)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -79,17 +79,36 @@ def refuse_twice(names: Sequence[str]) -> None:
         raise ValueError(f"observation has two entries of the name {twice[0]!r}; allowed are different names")
 
 
+Entries = Sequence[Entry] | Mapping[str, Sequence[Entry]]
+"""Type of a task's observation: entries, or those that each agent sees."""
+
+
+def _checked(entries) -> tuple[Entry, ...]:
+    """Entries of a list, or one."""
+    if isinstance(entries, Entry):
+        return (entries,)
+    if not isinstance(entries, (list, tuple)):
+        raise ValueError(f"observation is {entries!r}; allowed is a list of Entry, or a dict of such by agent")
+    for entry in entries:
+        if not isinstance(entry, Entry):
+            raise ValueError(f"observation holds {entry!r}; allowed are Entry and the functions of rigid_env.observe")
+    return tuple(entries)
+
+
 class Observation:
     """All entries of a task's observation, in the order of their numbers.
 
     Parameters
     ----------
-    entries : sequence of Entry
+    entries : sequence of Entry, or mapping of str to such
+        A mapping has the entries that each agent sees; one that several agents see is one object in their lists.
 
     Attributes
     ----------
     size : int
         Numbers in an observation.
+    views : dict of str to (k,) int64
+        For an observation by agents: indices of the numbers that each agent sees, in the order of its list.
     low, high : (size,) float32
         Bounds of each number.
     scales : (size,) float64
@@ -101,18 +120,13 @@ class Observation:
         An object that is no `Entry`, or two entries of one name.
     """
 
-    def __init__(self, entries: Sequence[Entry]):
-        if isinstance(entries, Entry):
-            entries = (entries,)
-        if not isinstance(entries, (list, tuple)):
-            raise ValueError(f"observation is {entries!r}; allowed is a list of Entry")
-        self.entries = tuple(entries)
-        for entry in self.entries:
-            if not isinstance(entry, Entry):
-                raise ValueError(
-                    f"observation holds {entry!r}; allowed are Entry and the functions of rigid_env.observe"
-                )
+    def __init__(self, entries: Entries):
+        parts = entries if isinstance(entries, Mapping) else {None: entries}
+        lists = {agent: _checked(part) for agent, part in parts.items()}
+        self.entries = tuple(dict.fromkeys(entry for part in lists.values() for entry in part))
         refuse_twice(self.names)
+        for part in lists.values():
+            refuse_twice([name for entry in part for name in entry.names])
         self.size = sum(len(entry.names) for entry in self.entries)
         spread = [len(entry.names) for entry in self.entries]
         self.low, self.high = (
@@ -121,6 +135,12 @@ class Observation:
         )
         ends = np.cumsum([0, *spread]).tolist()
         self._places = [slice(first, end) for first, end in pairwise(ends)]
+        where = {entry: range(place.start, place.stop) for entry, place in zip(self.entries, self._places)}
+        self.views = {
+            agent: np.array([k for entry in part for k in where[entry]], dtype=np.int64)
+            for agent, part in lists.items()
+            if agent is not None
+        }
         self.scales = np.repeat([entry.scale for entry in self.entries], spread)
         self._factors = np.repeat([1.0 / entry.scale for entry in self.entries], spread)
         self._targets: tuple[np.ndarray, list] = np.empty((0, self.size)), []

@@ -8,7 +8,7 @@ import re
 from rigid_env.tasks.draws import parameter_of
 
 ARGUMENTS = {
-    "accuracy": "preset of the engine, or a `physics.Accuracy`",
+    "accuracy": "preset of the engine, a `physics.Accuracy`, or a dict of its settings",
     "effects": "`physics` effects besides (`physics.Drag()`, ...), or instead of the task's of that class",
     "draws": "distributions instead of the task's, by name",
     "frame_skip": "physics steps per control step",

@@ -5,25 +5,27 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 import physics
+from physics.io.plain import read_effects
 
 REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
 """Parameter of a task that is fixed by an effect of each class."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:
-    """Check a user's effects, and return them as a tuple.
+    """Check a user's effects, and return them as a tuple. Each is an object, or a table as in a scene file.
 
     `randomised` has the names of the parameters that the task draws from a range.
 
     Raises
     ------
     ValueError
-        `effects` is no sequence, or an effect fixes a parameter that is drawn from a range.
+        `effects` is no sequence, an effect cannot be read, or one fixes a parameter that is drawn from a range.
     """
     try:
         effects = tuple(effects)
     except TypeError:
         raise ValueError(f"effects is {effects!r}; allowed is a sequence of effects") from None
+    effects = read_effects(effects)
     for field, effect in replaced(effects).items():
         if field in randomised:
             raise ValueError(f"effects holds {effect!r}, but {field} is drawn from a range; give one of the two")

@@ -114,6 +114,7 @@ def _indices(worlds: int, held: int, targets: restoring.Targets) -> tuple[np.nda
 def _write(task, arrays: Mapping[str, np.ndarray], state: TaskState, chosen, sources) -> None:
     """Copy rows `sources` of a state into rows `chosen` of a task and its environment."""
     given = state.arrays
+    task.episodes.changes += 1
     if type(sources) is slice:  # all, in their order
         for own in (task.kept_arrays, arrays):
             for name, array in own.items():

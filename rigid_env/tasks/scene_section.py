@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import physics
-from physics.io.scene_places import SourceLines
+from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.body_names import body_index
 from physics.summary import shown
@@ -22,13 +22,13 @@ class Section:
     values : mapping
         Values by key.
     name : str
-        Name of the table in errors, such as ``environment.goal`` of a file or ``goal`` of arguments; "": none.
-    lines : SourceLines, optional
-        Lines of the file, for errors. None: the values are arguments.
+        In errors, such as ``environment.goal`` of a file or ``goal`` of arguments; "": nothing stands in front.
+    places : Places, optional
+        In the scene that has the table. None: arguments.
     """
 
-    def __init__(self, values: Mapping[str, Any], name: str = "", lines: SourceLines | None = None):
-        self.values, self.name, self._places = values, name, lines
+    def __init__(self, values: Mapping[str, Any], name: str = "", places: Places | None = None):
+        self.values, self.name, self._places = values, name, places
 
     def __contains__(self, key: str) -> bool:
         return key in self.values

@@ -131,7 +131,7 @@ class SettingsReader:
     def __init__(self, scene: physics.Scene, file: SceneFile | None, given: SceneArguments):
         self._scene = scene
         table = file.others.get("environment", {}) if file is not None else {}
-        self._file = Section(table, "environment", file.lines) if file is not None else Section({})
+        self._file = Section(table, "environment", file.places) if file is not None else Section({})
         self._given = Section({key: value for key, value in part(given, SceneArguments).items() if value is not None})
 
     def section(self, key: str) -> Section:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import physics
 from physics import scenes
 from physics.io.mjcf.files import load_mjcf
-from physics.io.toml import SceneFile, load_file
+from physics.io.scene_places import Places
+from physics.io.toml import SceneFile, file_from_content, load_file
 from physics.keywords import nearest_first
 from physics.summary import shown
 
@@ -22,8 +24,8 @@ SCENE_FILES = (".toml", *MJCF_FILES)
 ENDINGS = f"{', '.join(SCENE_FILES[:-1])} or {SCENE_FILES[-1]}"
 """Endings of `SCENE_FILES` as words of a sentence."""
 
-SceneSource = physics.Scene | str | os.PathLike
-"""Type of an argument: a scene, the name of a canonical scene, or the path of a file."""
+SceneSource = physics.Scene | str | os.PathLike | Mapping[str, Any]
+"""Type of an argument: a scene, the name of a canonical one, a file, or the content of one as plain data."""
 
 
 class Found(NamedTuple):
@@ -45,7 +47,7 @@ class Found(NamedTuple):
 
 
 def find_scene(scene: SceneSource | None) -> Found:
-    """Find a user's scene: a scene object, the name of a canonical scene, or the path of a scene file.
+    """Find a user's scene: an object, the name of a canonical scene, the path of a scene file, or the content of one.
 
     Raises
     ------
@@ -54,9 +56,15 @@ def find_scene(scene: SceneSource | None) -> Found:
     """
     if isinstance(scene, physics.Scene):
         return Found("Scene", scene, None)
+    if isinstance(scene, Mapping):
+        file = file_from_content(scene, Places("scene"))
+        return Found("Scene", file.scene, file)
     allowed = f"a scene file ({ENDINGS})"
     if not isinstance(scene, (str, os.PathLike)) or not os.fspath(scene):
-        raise ValueError(f"scene is {shown(scene)}; allowed are {allowed}, a canonical scene, or a physics.Scene")
+        raise ValueError(
+            f"scene is {shown(scene)}; allowed are {allowed}, its content as a dict, a canonical scene, "
+            "or a physics.Scene"
+        )
     name = os.fspath(scene)
     path = Path(name)
     if path.suffix.lower() in SCENE_FILES or path.is_file():

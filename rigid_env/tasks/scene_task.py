@@ -45,10 +45,9 @@ class SceneTask(Task):
     Parameters
     ----------
     worlds : int
-        Number of worlds.
-    scene : physics.Scene, str or Path
-        A scene, the name of a canonical scene, or the path of a scene file, whose table [environment] has the settings
-        below.
+    scene : physics.Scene, str, Path or mapping
+        A scene, the name of a canonical one, or a scene file, whose table [environment] has the settings below. A
+        mapping is the content of such a file as plain data.
     driven, force, torque, frame, length, goal, start, frame_skip, dt
         Replace the keys of that table; None: the file's value, or the default. `goal` and `start` are dicts.
     episode_steps : int, optional

@@ -263,9 +263,9 @@ class Starts(Declaration):
         is_of_users = any(not str(part.__module__).startswith("rigid_env.") for part in parts)
         return not self.compiled or is_of_users or any(map(is_of_user, self.distributions.values()))
 
-    @property
+    @cached_property
     def own_draws(self) -> tuple[str, ...]:
-        """Names of the draws that `reset` reports in its info: all that `effects` do not fix."""
+        """Names of the draws that infos report: all that `effects` do not fix."""
         taken = replaced(self.effects)
         return tuple(name for name in self.drawn if name not in taken)
 

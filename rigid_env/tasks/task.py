@@ -21,7 +21,7 @@ from rigid_env.tasks import layout as col
 from rigid_env.tasks.actions import ActionTable
 from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
 from rigid_env.tasks.declaration import Declaration
-from rigid_env.tasks.declaration_checks import check_class, checked_limit, refuse_same_keys
+from rigid_env.tasks.declaration_checks import check_class, check_views, checked_limit, refuse_same_keys
 from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
@@ -58,11 +58,12 @@ class Task(Starts):
     ----------
     worlds : int
         Size of the batch.
-    accuracy : str or physics.Accuracy
-        Name of a preset, or all settings.
+    accuracy : str, physics.Accuracy or mapping
+        Name of a preset, or settings; as of `physics.World`.
     effects : sequence of physics effects
         Effects that are added to the scene's; one of the same class replaces the scene's. An effect must not fix a
-        parameter that is drawn.
+        parameter that is drawn. Each is an object or plain data as in a scene file, such as
+        ``{"kind": "Drag", "coefficient": 0.2}``.
     draws : mapping, optional
         Distributions in place of the task's own of the same names; a number is fixed, a pair (low, high) uniform.
     frame_skip : int
@@ -81,8 +82,9 @@ class Task(Starts):
         Declared by the subclass.
     actions : sequence of Wrench, Force and Impulse
         Declared: how the numbers of an action act on which bodies.
-    observation : sequence of Entry
-        Declared: `rigid_env.observe` has the usual entries.
+    observation : sequence of Entry, or mapping of str to such
+        Declared: `rigid_env.observe` has the usual entries. A mapping has the entries that each agent sees; the agents
+        are those of `actions`.
     draws : mapping of str to Distribution, number or pair
         Declared: values that each episode draws. ``mass``, ``size``, ``radius`` of spheres, ``friction``,
         ``restitution`` and ``gravity`` are written into the world (``mass[1]``: of body 1 alone); the task's functions
@@ -135,6 +137,7 @@ class Task(Starts):
         self.episodes.varying |= self._unlike_scene()
         self._table = ActionTable(self.actions, self.world.body_count)
         self.observed = Observation(self.observation)
+        check_views(type(self).__name__, self.observed.views, self.agents)
         self.clock, self._began = 0, np.zeros(self.worlds, dtype=np.int64)
         self._allocate()
         disturbances = self.disturbances if isinstance(self.disturbances, (list, tuple)) else (self.disturbances,)

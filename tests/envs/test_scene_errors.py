@@ -131,7 +131,8 @@ BALL = physics.Scene([physics.Sphere(0.5, 1.0)])
 ARGUMENTS = {
     "none": (
         {},
-        "scene is None; allowed are a scene file (.toml, .xml or .urdf), a canonical scene, or a physics.Scene",
+        "scene is None; allowed are a scene file (.toml, .xml or .urdf), its content as a dict, a canonical scene, "
+        "or a physics.Scene",
     ),
     "name": ({"scene": "tumbel"}, "scene is 'tumbel'; allowed are tumble,"),
     "file": ({"scene": "nix.toml"}, "scene is 'nix.toml', which does not exist; allowed is a scene file"),

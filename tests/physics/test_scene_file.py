@@ -124,7 +124,7 @@ def test_a_table_of_another_program_is_handed_back_with_its_lines():
         ("environment.goal", "body"): 7, ("environment.start", "pos"): 10, ("environment.start", None): 8,
     }  # fmt: skip
     for (table, key), line in lines.items():
-        assert str(file.lines.error_in_table(table, key, "no")) == f"here, line {line}: {table}: no"
+        assert str(file.places.error_in_table(table, key, "no")) == f"here, line {line}: {table}: no"
 
 
 def test_a_key_that_is_missing_is_not_looked_for_in_the_table_behind():

@@ -257,3 +257,31 @@ def test_refusals():
     assert not any(hasattr(BlockReachEnv(), name) for name in METHODS)
     with pytest.raises(TypeError, match=r"'acuracy'.*allowed are accuracy"):
         TaskEnv(BlockReachGoal, acuracy="fast")
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize("env_id", IDS)
+def test_parameters_are_attributes_as_in_a_batch(env_id):
+    env, envs = gym.make(env_id, friction=(0.2, 0.6)).unwrapped, gym.make_vec(env_id, num_envs=1, friction=(0.2, 0.6))
+    for each in (env, envs):
+        each.reset(seed=2)
+    for name in ("mass", "size", "friction", "restitution", "gravity"):
+        np.testing.assert_array_equal(getattr(env, name), envs.get_attr(name)[0])
+    env.friction = 0.3
+    assert env.step(np.zeros(6))[4]["friction"] == env.friction == 0.3
+    assert env.reset()[1]["friction"] == 0.3
+    env.friction = None
+    env.reset()
+    assert env.friction != 0.3
+    with pytest.raises(ValueError, match=r"friction is \[-1"):
+        env.friction = -1.0
+
+
+def test_a_parameter_that_the_task_does_not_draw_is_no_attribute():
+    env = TaskEnv(Slide)
+    assert not hasattr(env, "friction")
+    with pytest.raises(AttributeError, match="Slide does not draw 'mass'; allowed are no attributes"):
+        env.mass = 3.0
+    env = TaskEnv(type("Heavy", (Slide,), {"draws": {"mass": 2.0}}))
+    with pytest.raises(AttributeError, match="Heavy does not draw 'size'; allowed are mass"):
+        print(env.size)

@@ -1,0 +1,102 @@
+"""Scenes as plain data: dicts, lists, numbers and text, the content of a scene file.
+
+A body, wall or effect is a table: `kind` is the class, the other keys are its parameters under their names, in SI
+units. What is left out keeps its default.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Any
+
+from physics.io.scene_places import Places
+from physics.keywords import nearest_first
+from physics.scene.bodies import Block, Ellipsoid, Hull, Sphere
+from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.scene.force_fields import FIELDS
+from physics.scene.scene import HalfSpace, Scene
+from physics.summary import shown
+
+BODIES = (Block, Sphere, Ellipsoid, Hull)
+EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
+KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
+"""Classes that each list of a scene may hold."""
+
+
+def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
+    """Lists of a scene that are not empty, by name, each of tables."""
+    tables = {name: [plain_table(item) for item in getattr(scene, name)] for name in KINDS}
+    return {name: table for name, table in tables.items() if table}
+
+
+def plain_table(item) -> dict[str, Any]:
+    """Table of a body, wall or effect; parameters at their defaults are left out."""
+    found = {} if isinstance(item, HalfSpace) else {"kind": type(item).__name__}
+    for field in fields(item):
+        value = getattr(item, field.name)
+        if field.default is MISSING or value != field.default:
+            found[field.name] = _plain(value)
+    return found
+
+
+def _plain(value):
+    return [_plain(part) for part in value] if isinstance(value, tuple) else value
+
+
+def read_effects(effects) -> tuple:
+    """Effects, each given as an object or as a table of a scene file.
+
+    Raises
+    ------
+    ValueError
+        Naming the effect's index, the key, the value, and what is allowed.
+    """
+    return tuple(
+        build(Places(), "effects", k, effect, EFFECTS) if isinstance(effect, Mapping) else effect
+        for k, effect in enumerate(effects)
+    )
+
+
+def build_all(places: Places, name: str, tables, known: tuple[type, ...]) -> list:
+    """The objects of a list of tables."""
+    if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
+        raise places.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
+    return [build(places, name, k, table, known) for k, table in enumerate(tables)]
+
+
+def build(places: Places, name: str, index: int, table: Mapping[str, Any], known: tuple[type, ...]):
+    """The object of one table of the list `name`.
+
+    Raises
+    ------
+    ValueError
+        Naming place and key, the value, and what is allowed.
+    """
+    table = dict(table)
+    kinds = {kind.__name__: kind for kind in known}
+    if len(known) == 1:
+        chosen = next(iter(kinds))
+    elif "kind" in table:
+        chosen = table.pop("kind")
+    else:
+        raise places.error(name, index, None, f"kind is missing; allowed are {', '.join(kinds)}")
+    if not isinstance(chosen, str) or chosen not in kinds:
+        allowed = ", ".join(nearest_first(chosen, kinds) if isinstance(chosen, str) else kinds)
+        raise places.error(name, index, "kind", f"kind is {shown(chosen)}; allowed are {allowed}")
+    kind = kinds[chosen]
+    parameters = {field.name: field for field in fields(kind) if field.init}
+    for key in table:
+        if key not in parameters:
+            allowed = ", ".join(nearest_first(key, parameters))
+            raise places.error(name, index, key, f"{key} is not known; allowed are {allowed}")
+    for key, field in parameters.items():
+        if field.default is MISSING and field.default_factory is MISSING and key not in table:
+            raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
+    try:
+        return kind(**table)
+    except (ValueError, TypeError) as error:
+        told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
+        key = told.group(1) if told and told.group(1) in parameters else None
+        raise places.error(name, index, key, str(error)) from None
