@@ -108,10 +108,25 @@ def reorient_controller(observations: np.ndarray) -> np.ndarray:
     return actions
 
 
+def pushers_controller(observations: np.ndarray) -> np.ndarray:
+    """Control both agents of TwoPushers: each does what one agent of twice the strength would do.
+
+    Parameters
+    ----------
+    observations : (n, 24) float32
+
+    Returns
+    -------
+    (n, 12) float32
+    """
+    return np.tile(reach_controller(observations), (1, 2))
+
+
 CONTROLLERS = {
     "rigid_env/BlockReach-v0": "rigid_env.envs.controllers:reach_controller",
     "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
     "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
+    "rigid_env/TwoPushers-v0": "rigid_env.envs.controllers:pushers_controller",
 }
 """Places of the controllers, ``module:function``, by the id of their environment."""
 

@@ -2,4 +2,5 @@
 
 RATES = {
     "BlockCurl": (1.0, 0.1),
+    "TwoPushers": (0.9, 0.02),
 }
