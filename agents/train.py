@@ -88,7 +88,7 @@ def main(
     """Train an agent until it reaches the target, evaluate it, and record a video.
 
     What is not given comes from the hyperparameters of the environment and the algorithm. With --resume,
-    only target, limit and threads can be changed.
+    only --target, --max-steps and --threads can be changed.
     """
     start, console = time.perf_counter(), make_console()
     try:

@@ -121,7 +121,10 @@ def add_rows(first, end, total, table):
 
 @entry_kernel
 def add_report(total, table):
-    """Add the report `table` (worlds, REPORT_SIZE) of a step to `total`, that of earlier steps, as `add_rows` does."""
+    """Add the report of a step, `table`, to that of earlier steps, `total`; both are (worlds, REPORT_SIZE).
+
+    For each world counts are added, and of other columns the larger number stays (`add_rows`).
+    """
     add_rows(0, table.shape[0], total, table)
 
 

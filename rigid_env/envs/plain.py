@@ -38,9 +38,10 @@ class PlainSpec:
 
 
 def plain_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of an environment as plain data.
+    """Turn arguments of an environment into plain data, which JSON can hold.
 
-    Objects of a user's classes stay: fields, distributions, and tasks that cannot be imported.
+    Three kinds of objects are left as they are: force fields and distributions of a user's own classes, and tasks whose
+    class no module exports.
     """
     return {name: _plain(value) for name, value in settings.items()}
 

@@ -102,7 +102,7 @@ class Ghost:
 
     @property
     def label(self) -> str:
-        """Name of the ghost, with its own error if it is an estimate."""
+        """Name of the ghost; if its motion is an estimate, followed by the largest error of that motion [m]."""
         return f"{REFERENCE}, itself within {self.own_error:.1e} m" if self.is_estimate else REFERENCE
 
     def snapshot(self) -> tuple[physics.Snapshot, ...]:

@@ -11,7 +11,7 @@ import numba
 
 
 def _nothing() -> None:
-    """Do nothing; it is compiled as a test of the option."""
+    """Do nothing: an empty function, by whose compilation `_knows_option` sees if Numba accepts the option `_nrt`."""
 
 
 def _knows_option() -> bool:

@@ -1,6 +1,7 @@
-"""Control chatter, many events within a very short time: by the look-ahead to the next contact mode, and by leaps.
+"""Keep chatter short, which is a sequence of many events within a very short time.
 
-A leap is a short motion at constant velocities, of first order, after an impulse.
+Two means end it. One is a look ahead to the next contact mode. The other is a leap: after an impulse the body moves for
+a short time at constant velocities, with an error of first order in that time.
 """
 
 from __future__ import annotations

@@ -146,9 +146,10 @@ def implicit_point_force(w, n, s, t, wn, ws, wt, along, across):
 def soften_at(loads, arm, n, along, across, R, mass, J):
     """Soften the loads (a, T) of a body by a stiffness Z that acts at its point `arm`.
 
-    Z is `along` on the unit vector n, and `across` in directions perpendicular to n [kg]. With the mobility W of the
-    point and its acceleration w under the loads, the force f = (1 + Z W)⁻¹ Z w at the point is taken from the loads.
-    R is the matrix of the principal axes, J the inverse principal moments.
+    The loads are an acceleration a [m/s²] and a torque T [N m]. Z, the stiffness times a squared time [kg], is a matrix
+    with the value `along` in the direction of the unit vector n and `across` perpendicular to it. Let W be the mobility
+    of the point, and w its acceleration under the loads. Then the force f = (1 + Z W)⁻¹ Z w, which acts at the point,
+    is subtracted from the loads. R is the matrix of the principal axes, J the inverse principal moments.
     """
     a, T = loads
     w = plus(a, qt.cross(apply_inv_inertia(R, T, J), arm))

@@ -108,7 +108,7 @@ class Outcome:
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
-        """Check the last step against the laws, and return the quantities after it.
+        """Hold the last step against the laws of this module, count what breaks one, and return the quantities after it.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class Outcome:
         before : Look
             Quantities before the step.
         push_now : (worlds,) float64 or None
-            Result of `push` for the step's wrench; None: no wrench.
+            Upper bound of the growth of √(2 K) under the step's wrench, which `push` returns; None: no wrench acted.
         dt : float
             Length of the step [s].
         """

@@ -271,7 +271,7 @@ def newton_contacts(part, friction, residual, goal, limit, scale, many):
     part : tuple of 4 ints
         Island with contacts `islands.contacts[part[0]:part[1]]` and bodies `islands.bodies[part[2]:part[3]]`.
     friction : bool or None
-        None if the scene has no friction.
+        None if the scene has no friction; any other value if it has. The type decides what is compiled.
     residual : float
         Residual of the start [m/s].
     goal : float
