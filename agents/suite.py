@@ -113,7 +113,7 @@ def write_results(trials: Sequence[Trial], out: Path, results: Path, place: Plac
     errors = []
     with progress_bar(console) as bar:
         task = bar.add_task("judging", total=len(jobs))
-        for name, found, error in place.run(jobs) if jobs else ():
+        for name, found, error, _ in place.run(jobs) if jobs else ():
             bar.update(task, advance=1, description=name)
             if found is None:
                 errors.append(f"{name}: {error}")

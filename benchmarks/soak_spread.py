@@ -39,7 +39,7 @@ def merge(ends: Iterable[Ended], tick) -> tuple[dict, list[str]]:
     """
     found: dict[str, dict] = {}
     errors = []
-    for name, result, error in ends:
+    for name, result, error, _ in ends:
         tick(name)
         if result is None:
             errors.append(f"{name}: {error}")

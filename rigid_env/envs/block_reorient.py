@@ -36,8 +36,8 @@ class BlockReorientEnv(BlockEnv):
     ## Observation Space
 
     `Box` of 23 float32, world frame. Each number is told in its unit and clipped to its bounds. The body
-    axes are told as seen from the target: first the outward normal of the target face, then the next two
-    body axes in cyclic order (x, y, z, x, ...), and the half edges along them.
+    axes are told as seen from the target. The outward normal of the target face comes first, then the next
+    two body axes in cyclic order (x, y, z, x, ...). The half edges along the three follow.
 
     | Num | Observation | Min | Max | Unit |
     | --- | --- | --- | --- | --- |
@@ -67,9 +67,9 @@ class BlockReorientEnv(BlockEnv):
 
     ## Rewards
 
-    The gain of a potential, minus costs, plus a bonus. With a the angle between the target face's normal
-    and straight down [rad], v the speed [m/s], w the spin [rad/s], and h the share of the hold completed,
-    the potential is `-2 a - 0.1 (v + w) exp(-a / 0.3) + h`. Each step costs 0.01 and 0.0005 times the sum
+    The gain of a potential, minus costs, plus a bonus. The potential is `-2 a - 0.1 (v + w) exp(-a / 0.3) + h`,
+    with a the angle between the target face's normal and straight down [rad], v the speed [m/s], w the spin
+    [rad/s] and h the share of the hold completed. Each step costs 0.01 and 0.0005 times the sum
     of the squared action (after clipping to ±1). Success earns 5.
 
     ## Starting State

@@ -138,9 +138,9 @@ def _actions(task: Task) -> Section:
             rows.append((str(len(rows)), name + where, "-1", "1", vector.unit, *agent))
     kinds = {vector.kind for vector in task.action_vectors}
     notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"]
-    notes += [f"a the reach of the body ({REACH})"] if TORQUE in kinds else []
+    notes += [f"a is the reach of the body ({REACH})"] if TORQUE in kinds else []
     text = (
-        f"{', '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
+        f"{'. '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
     )
     text += " An impulse acts in the first physics step." if IMPULSE in kinds else ""
     before = f"`Box(-1, 1, ({task.action_size},), float32)`, held for one control step ({1e3 * task.control_dt:g} ms)."

@@ -60,7 +60,7 @@ def test_the_reach_of_a_hull_is_the_farthest_along_an_axis_from_its_centre_of_ma
     task.step(np.array([[0.0, 0.0, 1.0]]))
     assert task.wrench[0, 0, 5] == pytest.approx(0.5 * 6.0 * 9.81 * 3.0, rel=1e-12)
     told = "(longest half extent, of a hull the farthest along a body axis from the centre of mass)"
-    assert f"a the reach of the body {told}" in " ".join(describe(task).split())
+    assert f"a is the reach of the body {told}" in " ".join(describe(task).split())
 
 
 @pytest.mark.parametrize("frame", ["world", "body"])

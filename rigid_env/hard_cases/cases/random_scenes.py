@@ -108,7 +108,7 @@ class Outcome:
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
-        """Hold the last step against the laws of this module, count what breaks one, and return the quantities after it.
+        """Hold the last step against the laws of this module, note what breaks one, and return the quantities after it.
 
         Parameters
         ----------

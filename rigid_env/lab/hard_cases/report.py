@@ -179,7 +179,7 @@ def _here(runs: Sequence[Run], tell: Callable) -> Iterator[tuple[str, Outcome]]:
 def _there(runs: Sequence[Run], place: Place) -> Iterator[tuple[str, Outcome]]:
     """Run at a place; a run that is lost there fails."""
     by_name = {run.name: run for run in runs}
-    for name, outcome, error in place.run([run.job(place.folder) for run in runs]):
+    for name, outcome, error, _ in place.run([run.job(place.folder) for run in runs]):
         yield name, by_name[name].lost(error) if outcome is None else outcome
 
 

@@ -58,7 +58,7 @@ def found(jobs: Sequence[accuracy.Job], ends: Iterable[Ended], tick: Tick) -> It
         If a scene could not be measured.
     """
     by_key = {job.key: job for job in jobs}
-    for name, frontier, error in ends:
+    for name, frontier, error, _ in ends:
         tick(name)
         if frontier is None:
             raise ValueError(f"{name}: {error}")
