@@ -110,6 +110,7 @@ CONTROLLERS = {
     "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
     "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
     "rigid_env/BlockLand-v0": "rigid_env.suite.block_land:controller",
+    "rigid_env/BlockPose-v0": "rigid_env.suite.block_pose:controller",
 }
 """Where the controller of an environment stands, by its id."""
 

@@ -23,7 +23,7 @@ SPIN = 2.0  # of each axis at the start, at most [rad/s]
 FLAT = 0.03  # angle between the target face's normal and straight down [rad]
 TOUCH = 0.03  # gap to the floor [m]
 REST_SPEED, REST_SPIN = 0.1, 0.1  # [m/s], [rad/s]
-HOLD_STEPS = 10  # control steps in a row
+HOLD_STEPS = 5  # control steps in a row
 
 # --- rewards ----------------------------------------------------------------------------------------------
 TURN_VALUE = 1.0  # potential lost per radian off the target [1/rad]
@@ -31,7 +31,7 @@ CALM_VALUE = 0.1  # potential lost per m/s and rad/s with the face down ...
 CALM_RANGE = 0.3  # ... and 1/e of that at this angle [rad]
 HOLD_VALUE = 1.0  # potential of a completed hold
 PEAK_PRICE = 2.0  # of the largest impulse of an impact [1/(m g s)]
-STEP_COST = 0.01
+STEP_COST = 0.02
 SUCCESS_BONUS = 5.0
 
 
@@ -63,18 +63,18 @@ class BlockLand(Task):
 
     ## Description
 
-    The block of `BlockReach`, 5 x 3 x 2 m and 6 kg, is thrown over an open floor, in any attitude and spinning. The
-    agent has a force of up to 2 m g at its centre and a torque of up to m g a, where a is the longest half edge. Both
-    draw on one budget: force over m g plus torque over m g a, integrated over time, may reach 2.5 s. Hovering for 2.5
-    seconds takes all of it. Once less is left than a control step of full thrust and twist would take, both are gone.
-    What counts is the face that is down at the end, and the hardest blow on the way there.
+    The block of `BlockReach`, 5 x 3 x 2 m and 6 kg, is thrown over an open floor, in any attitude and spinning. A
+    control step is 50 ms. The agent has a force of up to 2 m g at its centre and a torque of up to m g a, where a is
+    the longest half edge. Both draw on one budget: force over m g plus torque over m g a, integrated over time, may
+    reach 2.5 s. Hovering for 2.5 s takes all of it. Once less is left than a control step of full force and torque
+    would take, both are gone. The face that is down at the end counts, and the hardest blow on the way there.
 
     ## Rewards
 
     `progress`: the gain of a potential. With a the angle between the target face's normal and straight down [rad], v
     the speed [m/s], w the spin [rad/s] and h the share of the hold completed, it is `-a - 0.1 (v + w) exp(-a / 0.3) +
     h`. `peak`: minus 2 times the growth of the peak, which is the largest impulse that impacts gave the block in one
-    control step, over m g [s]. `time`: -0.01 in each step. `success`: 5.
+    control step, over m g [s]. `time`: -0.02 in each step. `success`: 5.
 
     ## Starting State
 
@@ -83,9 +83,9 @@ class BlockLand(Task):
 
     ## Episode End
 
-    Success: on 10 control steps in a row the target face lies on the floor (within 0.03 rad and 0.03 m), at a speed of
+    Success: on 5 control steps in a row the target face lies on the floor (within 0.03 rad and 0.03 m), at a speed of
     at most 0.1 m/s and a spin of at most 0.1 rad/s. Failure: the budget is spent, and the block rests on another face.
-    Truncation after 240 control steps (6 s). `info` holds `angle` [rad], `speed` [m/s], `spin` [rad/s], `peak` [m g s]
+    Truncation after 120 control steps (6 s). `info` holds `angle` [rad], `speed` [m/s], `spin` [rad/s], `peak` [m g s]
     and `left`, the rest of the budget [m g s].
 
     A face comes down by chance in one of six throws.
@@ -120,7 +120,10 @@ class BlockLand(Task):
         "target_face": Choice(range(6)),
     }
     memory = {"spent": 1, "peak": 1, "held": 1, "still": 1, "potential": 1}
-    max_episode_steps = 240
+    max_episode_steps = 120
+
+    def __init__(self, worlds: int = 1, *, frame_skip=10, **settings):
+        super().__init__(worlds, frame_skip=frame_skip, **settings)
 
     def place(self, drawn):
         """Over the origin, moving."""

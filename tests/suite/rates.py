@@ -3,4 +3,5 @@
 RATES = {
     "BlockCurl": (1.0, 0.1),
     "BlockLand": (0.98, 0.3),  # a face in six comes down by chance
+    "BlockPose": (0.98, 0.0),
 }

@@ -11,7 +11,7 @@ from rigid_env.suite.block_land import BUDGET, FLAT, HALF, THRUST, TWIST, Attitu
 from rigid_env.suite.faces import target_axes
 
 ENV = "rigid_env/BlockLand-v0"
-STEP = 0.025 * (THRUST + TWIST)  # what a control step of full thrust and twist takes [m g s]
+STEP = 0.05 * (THRUST + TWIST)  # what a control step of full thrust and twist takes [m g s]
 FLAT_DROP = {"attitude": (1.0, 0.0, 0.0, 0.0), "linvel": (0.0, 0.0, 0.0), "angvel": (0.0, 0.0, 0.0), "target_face": 2}
 
 
@@ -34,8 +34,8 @@ def test_full_thrust_lasts_as_long_as_the_budget():
 
 
 def test_thrust_costs_by_its_length():
-    """Half the force for one step, along any direction: 0.5 · 2 · 0.025 m g s; torque: 0.5 · 1 · 0.025."""
-    for action, cost in (([0.3, 0.4, 0.0, 0, 0, 0], 0.025), ([0, 0, 0, 0.3, 0.0, 0.4], 0.0125), ([2.0] * 6, STEP)):
+    """Half the force for one step, along any direction: 0.5 · 2 · 0.05 m g s; torque: 0.5 · 1 · 0.05."""
+    for action, cost in (([0.3, 0.4, 0.0, 0, 0, 0], 0.05), ([0, 0, 0, 0.3, 0.0, 0.4], 0.025), ([2.0] * 6, STEP)):
         info = make(height=9.0).step(np.array(action, dtype=float))[4]
         assert info["left"] == pytest.approx(BUDGET - cost, abs=1e-12)
 
@@ -45,7 +45,7 @@ def test_the_peak_of_a_flat_fall_is_its_closed_form():
     of impact to the tolerance of the contacts, 1e-3 of v at most; the bounce of e v falls again, more softly."""
     drop, restitution = 6.0, 0.2
     env = make(height=HALF[1] + drop)
-    peaks = [env.step(np.zeros(6))[4]["peak"] for _ in range(120)]
+    peaks = [env.step(np.zeros(6))[4]["peak"] for _ in range(60)]
     assert peaks[-1] == pytest.approx((1.0 + restitution) * np.sqrt(2.0 * G * drop) / G, rel=2e-3)
     assert np.all(np.diff(peaks) >= 0.0)
 
@@ -65,7 +65,7 @@ def test_a_flat_fall_on_the_target_face_is_a_success_and_its_peak_is_paid_for():
 def test_hovering_with_the_face_down_is_no_success():
     """A block held in the air, upright and at rest, until its budget is gone."""
     env = make(height=9.0)
-    hover, steps = np.array([0.0, 1.0 / THRUST, 0.0, 0.0, 0.0, 0.0]), int(0.9 * BUDGET / 0.025)
+    hover, steps = np.array([0.0, 1.0 / THRUST, 0.0, 0.0, 0.0, 0.0]), int(0.9 * BUDGET / 0.05)
     for _ in range(steps):
         _, _, terminated, _, info = env.step(hover)
         assert not terminated
@@ -92,7 +92,7 @@ def test_the_controller_lands_softly():
         envs = gym.make_vec(ENV, num_envs=32, autoreset_mode="SameStep")
         seen, _ = envs.reset(seed=0)
         peak, is_over = np.zeros(32), np.zeros(32, dtype=bool)
-        for _ in range(110):
+        for _ in range(60):
             seen, _, terminated, _, infos = envs.step(policy(seen))
             is_over |= terminated
             peak = np.where(is_over, peak, infos["peak"])
