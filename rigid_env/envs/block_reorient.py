@@ -67,9 +67,9 @@ class BlockReorientEnv(BlockEnv):
 
     ## Rewards
 
-    The gain of a potential, minus costs, plus a bonus. The potential is `-2 a - 0.1 (v + w) exp(-a / 0.3) + h`,
-    with a the angle between the target face's normal and straight down [rad], v the speed [m/s], w the spin
-    [rad/s] and h the share of the hold completed. Each step costs 0.01 and 0.0005 times the sum
+    The gain of a potential, minus costs, plus a bonus. The potential is `-2 a - 0.1 (v + w) exp(-a / 0.3) + h`.
+    Here a is the angle between the target face's normal and straight down [rad], v the speed [m/s], w the
+    spin [rad/s] and h the share of the hold completed. Each step costs 0.01 and 0.0005 times the sum
     of the squared action (after clipping to ±1). Success earns 5.
 
     ## Starting State

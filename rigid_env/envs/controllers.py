@@ -127,6 +127,8 @@ CONTROLLERS = {
     "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
     "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
     "rigid_env/TwoPushers-v0": "rigid_env.envs.controllers:pushers_controller",
+    "rigid_env/BlockLand-v0": "rigid_env.suite.block_land:controller",
+    "rigid_env/BlockPose-v0": "rigid_env.suite.block_pose:controller",
 }
 """Places of the controllers, ``module:function``, by the id of their environment."""
 

@@ -15,7 +15,12 @@ MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 GOALS = {"BlockReachGoal": 75, "BlockReorientGoal": 75}
 """Control steps after which an episode is truncated, by task with goals: 7.5 s at the default 100 ms."""
 
-SUITE = {"BlockCurl": 200, "TwoPushers": 300}
+SUITE = {
+    "BlockCurl": 200,
+    "TwoPushers": 300,
+    "BlockLand": 120,
+    "BlockPose": 300,
+}
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 
 SCENE_ID = f"{NAMESPACE}/Scene-v0"

@@ -3,4 +3,6 @@
 RATES = {
     "BlockCurl": (1.0, 0.1),
     "TwoPushers": (0.9, 0.02),
+    "BlockLand": (0.98, 0.3),  # a face in six comes down by chance
+    "BlockPose": (0.98, 0.0),
 }
