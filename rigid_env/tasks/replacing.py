@@ -6,7 +6,12 @@ from collections.abc import Collection, Sequence
 
 import physics
 
-REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
+REPLACES = {
+    physics.Gravity: "gravity",
+    physics.Contact: "restitution",
+    physics.Friction: "friction",
+    physics.Wind: "wind",
+}
 """Parameter of a task that each effect replaces."""
 
 

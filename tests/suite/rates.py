@@ -2,4 +2,5 @@
 
 RATES = {
     "BlockCurl": (1.0, 0.1),
+    "BallKick": (0.95, 0.05),
 }
