@@ -3,13 +3,15 @@
 Also a check whether any field of a plan depends on time.
 """
 
+"""Winds of single worlds of a batch: their mean, gusts that begin anew, and whether a field depends on time."""
+
 from __future__ import annotations
 
 import math
 
 import numpy as np
 
-from physics.kernels.forces.wind import WIND_GUST, WIND_PHASES, WIND_TIME_SCALE, WIND_WAVES
+from physics.kernels.forces.wind import WIND_GUST, WIND_MEAN, WIND_PHASES, WIND_TIME_SCALE, WIND_WAVES
 from physics.kernels.state import layout as at
 from physics.plan.plan import Plan
 from physics.scene.force_fields import Wind
@@ -56,6 +58,24 @@ def begin_gusts(world: Batch, worlds: np.ndarray, shares: np.ndarray) -> None:
         begun = phases - _frequencies() / time_scale * world.time
         columns = slice(first + WIND_PHASES, first + WIND_PHASES + PHASES)
         params[worlds, :, columns] = begun.reshape(len(worlds), 1, PHASES)
+    if world.recorder is not None:
+        world.recorder.changed(worlds)
+
+
+def set_winds(world: Batch, worlds: np.ndarray, velocity: np.ndarray) -> None:
+    """Give worlds their own mean winds; gusts stay.
+
+    Parameters
+    ----------
+    world : Batch
+        Of a scene with `physics.Wind`.
+    worlds : (k,) int64
+    velocity : (k, 3) float
+        World frame, finite [m/s].
+    """
+    params = world.params.reshape(world.worlds, world.body_count, -1)
+    for first in _winds(world.plan):
+        params[worlds, :, first + WIND_MEAN : first + WIND_MEAN + 3] = velocity[:, None]
     if world.recorder is not None:
         world.recorder.changed(worlds)
 

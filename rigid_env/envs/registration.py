@@ -20,6 +20,7 @@ SUITE = {
     "TwoPushers": 300,
     "BlockLand": 120,
     "BlockPose": 300,
+    "BallKick": 6,
 }
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 

@@ -9,6 +9,13 @@ from physics.io.plain import read_effects
 
 REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
 """Parameter of a task that is fixed by an effect of each class."""
+REPLACES = {
+    physics.Gravity: "gravity",
+    physics.Contact: "restitution",
+    physics.Friction: "friction",
+    physics.Wind: "wind",
+}
+"""Parameter of a task that each effect replaces."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:

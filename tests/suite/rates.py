@@ -5,4 +5,5 @@ RATES = {
     "TwoPushers": (0.9, 0.02),
     "BlockLand": (0.98, 0.3),  # a face in six comes down by chance
     "BlockPose": (0.98, 0.0),
+    "BallKick": (0.95, 0.05),
 }
