@@ -1,4 +1,4 @@
-"""BallJuggle: keep a ball bouncing on a block, up to a height that is told."""
+"""BallJuggle: keep a ball bouncing on a block that hangs on springs, up to a height that is told."""
 
 from __future__ import annotations
 
@@ -13,13 +13,15 @@ SIDE, THICKNESS, BLOCK_MASS = 0.8, 0.2, 4.0  # [m], [m], [kg]
 RADIUS, BALL_MASS = 0.08, 0.2  # [m], [kg]
 TOUCHING = THICKNESS / 2 + RADIUS  # height of the ball's centre over that of a level block, when they touch [m]
 RESTITUTION, FRICTION = (0.6, 0.9), 0.3
-STRENGTH, TURNING = 3.0, 0.3  # longest force over the weight, longest torque over weight times half the side
-WANTED = (1.0, 1.6)  # height of the apex, of the ball's centre over the floor [m]
+RATE = 5.0  # of the block on its springs, up and down and sideways [rad/s]
+DAMPING = 3.0  # of each spring [N s/m]
+STRENGTH, TURNING = 2.0, 0.3  # longest force over the weight, longest torque over weight times half the side
+WANTED = (0.7, 1.3)  # height of the apex: the ball's centre over the block's place at rest [m]
 TOLERANCE = 0.05  # of an apex [m]
 CLEARANCE = 0.3  # gap between ball and block that an apex needs to count [m]
 APEXES = 4  # in a row that are a success
 FLYING = 0.05  # gap above which the ball flies freely for sure [m]
-RELEASE = (0.9, 1.3)  # height of the ball at the start [m]
+RELEASE = (0.6, 1.0)  # height of the ball at the start [m]
 ASIDE, DRIFT = 0.1, 0.15  # largest offset from the block's centre [m] and speed [m/s] at the start, x and z each
 LENGTH, BALL_SPEED, BALL_SPIN = 1.0, 5.0, 10.0  # units of the observation [m], [m/s], [rad/s]
 BLOCK_SPEED, BLOCK_SPIN, TILT = 2.0, 5.0, 0.5  # [m/s], [rad/s], [1]
@@ -27,12 +29,22 @@ PRICES = {"apex": 1.0, "aside": 0.5, "drift": 0.25, "tilt": 0.5}  # of the poten
 APEX_BONUS = 0.5  # for each apex in a row
 
 # --- the controller ---------------------------------------------------------------------------------------
-STRIKE = 0.55  # height of the ball's centre at impacts [m]
 MOST_MIRROR = 0.6  # speed of the block over that of the ball
 HEIGHT_GAIN, SPEED_GAIN = 200.0, 25.0  # of the block's motion [1/s²], [1/s]
 FOLLOW_GAIN, FOLLOW_DAMPING = 60.0, 14.0  # of the motion under the ball [1/s²], [1/s]
 LEAN_BACK, LEAN_AGAINST = 0.06, 0.12  # tilt against an offset [1/m], against a drift [s/m]
 TURN_GAIN, TURN_DAMPING = 150.0, 22.0  # [1/s²], [1/s]
+SPRING_TURN = (RATE * SIDE / 2) ** 2 / ((SIDE**2 + THICKNESS**2) / 12.0)  # the springs' own, per tilt [1/s²]
+
+
+def springs():
+    """Springs at the corners of the block's middle plane. Their anchors are straight above, where they carry it."""
+    corners = [(x * SIDE / 2, z * SIDE / 2) for x in (-1, 1) for z in (-1, 1)]
+    stiffness, stretch = BLOCK_MASS * RATE**2 / 4, G / RATE**2
+    return [
+        physics.Spring((x, stretch, z), (x, 0.0, z), stiffness=stiffness, damping=DAMPING, body=BLOCK)
+        for x, z in corners
+    ]
 
 
 def gap(worlds):
@@ -41,7 +53,7 @@ def gap(worlds):
 
 
 def apex_ahead(worlds):
-    """Height of the apex of the ball's flight, ahead or behind (n,) [m]; while the ball touches, that of the last one."""
+    """Height of the apex of the present flight, ahead or behind (n,) [m]; in a touch that of the last one."""
     height = worlds.pos[:, BALL, 1] + worlds.linvel[:, BALL, 1] ** 2 / (2.0 * G)
     return np.where(gap(worlds) > FLYING, height, worlds.memory["apex"])
 
@@ -51,10 +63,11 @@ class BallJuggle(Task):
 
     ## Description
 
-    A flat block of 4 kg lies on a floor, and a ball of 0.2 kg falls on it. The agent drives the block with a force of
-    up to three times its weight, and tilts it with torques about x and z. The ball's restitution and the height that
-    it is to reach differ from episode to episode, and the agent is told both. A block that lies still loses height
-    with each impact, at least 19 % of the rise. A ball that drifts aside comes back only if the block tilts.
+    A flat block of 4 kg hangs level on four springs at its corners, and a ball of 0.2 kg falls on it. The agent drives
+    the block with a force of up to twice its weight, and tilts it with torques about x and z. The ball's restitution
+    and the height that it is to reach differ from episode to episode, and the agent is told both. Heights are those of
+    the ball's centre over the block's place at rest. A ball that meets the block at rest loses at least a third of its
+    rise. A ball that drifts aside comes back only if the block tilts.
 
     ## Rewards
 
@@ -65,9 +78,8 @@ class BallJuggle(Task):
 
     ## Starting State
 
-    The block lies at rest at the origin. The ball's centre is 0.9 to 1.3 m over the floor and up to 0.1 m aside, along
-    x and z each; it drifts at up to 0.15 m/s along each. Its restitution is 0.6 to 0.9. The wanted apex is 1.0 to
-    1.6 m over the floor.
+    The block is at rest at the origin. The ball is 0.6 to 1.0 m above and up to 0.1 m aside, along x and z each; it
+    drifts at up to 0.15 m/s along each. Its restitution is 0.6 to 0.9. The wanted apex is at 0.7 to 1.3 m.
 
     ## Episode End
 
@@ -83,11 +95,12 @@ class BallJuggle(Task):
 
     scene = physics.Scene(
         bodies=[
-            physics.Block(size=(SIDE, THICKNESS, SIDE), mass=BLOCK_MASS, pos=(0.0, THICKNESS / 2, 0.0)),
+            physics.Block(size=(SIDE, THICKNESS, SIDE), mass=BLOCK_MASS),
             physics.Sphere(radius=RADIUS, mass=BALL_MASS, pos=(0.0, 1.0, 0.0)),
         ],
-        walls=[physics.HalfSpace((0.0, 1.0, 0.0), 0.0)],
-        effects=[physics.Gravity((0.0, -G, 0.0)), physics.Contact(RESTITUTION[1]), physics.Friction(FRICTION)],
+        effects=[
+            physics.Gravity((0.0, -G, 0.0)), physics.Contact(RESTITUTION[1]), physics.Friction(FRICTION), *springs()
+        ],
     )
     actions = Wrench(BLOCK, force=STRENGTH, torque=TURNING, torque_axes="xz")
     observation = [
@@ -98,7 +111,7 @@ class BallJuggle(Task):
         Entry(("ball velocity x", "ball velocity y", "ball velocity z"), "m/s", -5, 5,
               lambda w: w.linvel[:, BALL], BALL_SPEED),
         Entry(("ball spin x", "ball spin z"), "rad/s", -5, 5, lambda w: w.angvel[:, BALL, ::2], BALL_SPIN),
-        Entry("block height", "m", 0, 3, lambda w: w.pos[:, BLOCK, 1], LENGTH),
+        Entry(("block x", "block y", "block z"), "m", -3, 3, lambda w: w.pos[:, BLOCK], LENGTH),
         Entry(("block velocity x", "block velocity y", "block velocity z"), "m/s", -5, 5,
               lambda w: w.linvel[:, BLOCK], BLOCK_SPEED),
         Entry(("block's upward axis x", "block's upward axis z"), "1", -2, 2,
@@ -106,13 +119,12 @@ class BallJuggle(Task):
         Entry(("block spin x", "block spin z"), "rad/s", -5, 5, lambda w: w.angvel[:, BLOCK, ::2], BLOCK_SPIN),
         Entry("apex minus wanted apex", "m", -3, 3, lambda w: w.memory["apex"] - w.drawn["wanted"], LENGTH),
         Entry("wanted apex", "m", 0, 3, lambda w: w.drawn["wanted"], LENGTH),
-        Entry("restitution", "1", 0, 1, lambda w: w.drawn["restitution[1]"]),
+        Entry("restitution", "1", 0, 1, lambda w: w.drawn["restitution"]),
         Entry("share of the apexes in a row", "1", 0, 1, lambda w: w.memory["row"] / APEXES),
     ]  # fmt: skip
     draws = {
         "wanted": WANTED,
-        "restitution[0]": 0.0,  # of the block, which does not bounce off the floor
-        "restitution[1]": RESTITUTION,
+        "restitution": RESTITUTION,
         "release": RELEASE,
         "aside": Uniform((-ASIDE, -ASIDE), (ASIDE, ASIDE)),
         "drift": Uniform((-DRIFT, -DRIFT), (DRIFT, DRIFT)),
@@ -121,9 +133,9 @@ class BallJuggle(Task):
     max_episode_steps = 300
 
     def place(self, drawn):
-        """Block on the floor, ball above."""
+        """Block at rest, ball above."""
         pos, linvel = np.zeros((2, len(drawn["release"]), 2, 3))
-        pos[:, BLOCK, 1], pos[:, BALL, 1] = THICKNESS / 2, drawn["release"]
+        pos[:, BALL, 1] = drawn["release"]
         pos[:, BALL, ::2], linvel[:, BALL, ::2] = drawn["aside"], drawn["drift"]
         return {"pos": pos, "linvel": linvel}
 
@@ -196,7 +208,7 @@ def mirror_ratio(apex, wanted, restitution):
     (n,) float
         Clipped to ±0.6.
     """
-    fall, rise = (np.sqrt(np.maximum(height - STRIKE, 0.05)) for height in (apex, wanted))
+    fall, rise = (np.sqrt(np.maximum(height - TOUCHING, 0.05)) for height in (apex, wanted))
     ratio = (rise / fall + 1.0) * (1.0 + BALL_MASS / BLOCK_MASS) / (1.0 + restitution) - 1.0
     return ratio.clip(-MOST_MIRROR, MOST_MIRROR)
 
@@ -210,24 +222,24 @@ def controller(observations: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    observations : (n, 20) float32
+    observations : (n, 22) float32
 
     Returns
     -------
     (n, 5) float32
     """
     offset, velocity = LENGTH * observations[:, 0:3], BALL_SPEED * observations[:, 3:6]
-    height, speed = LENGTH * observations[:, 8], BLOCK_SPEED * observations[:, 9:12]
-    up, spin = TILT * observations[:, 12:14], BLOCK_SPIN * observations[:, 14:16]
-    wanted, restitution = LENGTH * observations[:, 17], observations[:, 18]
-    apex = LENGTH * observations[:, 16] + wanted
-    ratio = mirror_ratio(apex, wanted, restitution)
-    place = STRIKE - TOUCHING - ratio * (height + offset[:, 1] - STRIKE)
-    lift = HEIGHT_GAIN * (place - height) + SPEED_GAIN * (-ratio * velocity[:, 1] - speed[:, 1]) + (1.0 + ratio) * G
+    pos, speed = LENGTH * observations[:, 8:11], BLOCK_SPEED * observations[:, 11:14]
+    up, spin = TILT * observations[:, 14:16], BLOCK_SPIN * observations[:, 16:18]
+    wanted, restitution = LENGTH * observations[:, 19], observations[:, 20]
+    ratio = mirror_ratio(LENGTH * observations[:, 18] + wanted, wanted, restitution)
+    place = -ratio * (pos[:, 1] + offset[:, 1] - TOUCHING)
+    lift = HEIGHT_GAIN * (place - pos[:, 1]) + SPEED_GAIN * (-ratio * velocity[:, 1] - speed[:, 1]) + ratio * G
     aside, drift = offset[:, ::2], velocity[:, ::2]
     follow = FOLLOW_GAIN * aside + FOLLOW_DAMPING * (drift - speed[:, ::2])
-    wrong = -LEAN_BACK * aside - LEAN_AGAINST * drift - up
+    force = np.stack([follow[:, 0], lift, follow[:, 1]], axis=1) + RATE**2 * pos  # the springs' share in the motion
+    lean = -LEAN_BACK * aside - LEAN_AGAINST * drift
+    turn = (TURN_GAIN * (lean - up) + SPRING_TURN * up)[:, ::-1] * (1.0, -1.0) - TURN_DAMPING * spin
     inertia = (SIDE**2 + THICKNESS**2) / 12.0
-    torque = inertia * (TURN_GAIN * wrong[:, ::-1] * (1.0, -1.0) - TURN_DAMPING * spin) / (TURNING * G * SIDE / 2)
-    force = np.stack([follow[:, 0], lift, follow[:, 1]], axis=1) / (STRENGTH * G)
-    return np.concatenate([force, torque], axis=1).clip(-1.0, 1.0).astype(np.float32)
+    actions = np.concatenate([force / (STRENGTH * G), inertia * turn / (TURNING * G * SIDE / 2)], axis=1)
+    return actions.clip(-1.0, 1.0).astype(np.float32)

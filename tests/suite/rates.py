@@ -2,4 +2,5 @@
 
 RATES = {
     "BlockCurl": (1.0, 0.1),
+    "BallJuggle": (1.0, 0.0),
 }
