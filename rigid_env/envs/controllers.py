@@ -130,6 +130,7 @@ CONTROLLERS = {
     "rigid_env/BlockLand-v0": "rigid_env.suite.block_land:controller",
     "rigid_env/BlockPose-v0": "rigid_env.suite.block_pose:controller",
     "rigid_env/BallKick-v0": "rigid_env.suite.ball_kick:controller",
+    "rigid_env/BallJuggle-v0": "rigid_env.suite.ball_juggle:controller",
 }
 """Places of the controllers, ``module:function``, by the id of their environment."""
 

@@ -21,6 +21,7 @@ SUITE = {
     "BlockLand": 120,
     "BlockPose": 300,
     "BallKick": 6,
+    "BallJuggle": 300,
 }
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 

@@ -6,4 +6,5 @@ RATES = {
     "BlockLand": (0.98, 0.3),  # a face in six comes down by chance
     "BlockPose": (0.98, 0.0),
     "BallKick": (0.95, 0.05),
+    "BallJuggle": (1.0, 0.0),
 }
