@@ -1,8 +1,3 @@
-"""Restart of the gusts of some worlds of a batch, although all its worlds share one time.
-
-Also a check whether any field of a plan depends on time.
-"""
-
 """Winds of single worlds of a batch: their mean, gusts that begin anew, and whether a field depends on time."""
 
 from __future__ import annotations

@@ -7,15 +7,13 @@ from collections.abc import Collection, Sequence
 import physics
 from physics.io.plain import read_effects
 
-REPLACES = {physics.Gravity: "gravity", physics.Contact: "restitution", physics.Friction: "friction"}
-"""Parameter of a task that is fixed by an effect of each class."""
 REPLACES = {
     physics.Gravity: "gravity",
     physics.Contact: "restitution",
     physics.Friction: "friction",
     physics.Wind: "wind",
 }
-"""Parameter of a task that each effect replaces."""
+"""Parameter of a task that is fixed by an effect of each class."""
 
 
 def checked_effects(effects, randomised: Collection[str]) -> tuple:
