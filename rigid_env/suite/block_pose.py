@@ -84,9 +84,9 @@ class BlockPose(BlockTask):
 
     The block of `BlockReach` in the same box, acted upon by the same force and torque, at 50 ms for a control step. A
     pose on the floor is wanted: the place of the centre, the face that is down, which is not the one at the start, and
-    the heading, which is the turn about the vertical, as `yaw` of a start. The block has a shape that no turn but the
-    whole one brings back to itself, as its faces are told apart. Tumbling onto the face moves the block and turns it,
-    so that each of the three goals may undo another one.
+    the heading, which is the turn about the vertical, as `yaw` of a start. A heading that is half a turn off is wrong,
+    although the block looks the same. Tumbling onto the face also moves the block and turns it, so that each of the
+    three goals may undo another one.
 
     ## Rewards
 
