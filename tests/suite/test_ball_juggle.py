@@ -10,8 +10,21 @@ from hypothesis import strategies as st
 
 import rigid_env  # noqa: F401 (registers)
 from rigid_env.suite.ball_juggle import (
-    APEX_BONUS, APEXES, BALL, BALL_MASS, BLOCK, BLOCK_MASS, G, MOST_MIRROR, RATE, STRENGTH, TOLERANCE, TOUCHING, WANTED,
-    controller, mirror_ratio,
+    APEX_BONUS,
+    APEXES,
+    BALL,
+    BALL_MASS,
+    BLOCK,
+    BLOCK_MASS,
+    MOST_MIRROR,
+    RATE,
+    STRENGTH,
+    TOLERANCE,
+    TOUCHING,
+    WANTED,
+    G,
+    controller,
+    mirror_ratio,
 )  # fmt: skip
 
 ENV = "rigid_env/BallJuggle-v0"
