@@ -185,7 +185,7 @@ class BallJuggle(Task):
         return {"progress": progress, "lost": -1.0 * worlds.failure, "success": 2.0 * worlds.success}
 
     def goal_mark(self, world):
-        """A sphere at the wanted apex, above the block."""
+        """A disc at the wanted apex, above the block."""
         x, _, z = self.world.pos[world, BLOCK]
         reached = abs(self.memory_arrays["apex"][world] - self.drawn["wanted"][world]) < TOLERANCE
         return {"pos": (x, self.drawn["wanted"][world], z), "radius": TOLERANCE, "reached": bool(reached)}
@@ -199,7 +199,8 @@ def mirror_ratio(apex, wanted, restitution):
 
         w = (1 + e) M / (M + m) (u + v) - u,
 
-    and w² = 2 g (wanted - strike), u² = 2 g (apex - strike). A positive ratio raises the block.
+    and w² = 2 g (wanted - h), u² = 2 g (apex - h), with h the height of the ball at impacts. A positive ratio means
+    that the block rises.
 
     Parameters
     ----------
