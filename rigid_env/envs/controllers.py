@@ -109,6 +109,8 @@ CONTROLLERS = {
     "rigid_env/BlockReach-v0": "rigid_env.envs.controllers:reach_controller",
     "rigid_env/BlockReorient-v0": "rigid_env.envs.controllers:reorient_controller",
     "rigid_env/BlockCurl-v0": "rigid_env.suite.block_curl:controller",
+    "rigid_env/BlockStack-v0": "rigid_env.suite.block_stack:controller",
+    "rigid_env/BlockBalance-v0": "rigid_env.suite.block_balance:controller",
 }
 """Where the controller of an environment stands, by its id."""
 

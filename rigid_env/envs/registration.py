@@ -15,7 +15,7 @@ MAX_EPISODE_STEPS = {"BlockReach": 300, "BlockReorient": 300}
 GOALS = {"BlockReachGoal": 75, "BlockReorientGoal": 75}
 """Tasks with goals, and control steps of their episodes: 7.5 s at the default 50 ms."""
 
-SUITE = {"BlockCurl": 200}
+SUITE = {"BlockCurl": 200, "BlockStack": 240, "BlockBalance": 240}
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 
 SCENE_ID = f"{NAMESPACE}/Scene-v0"

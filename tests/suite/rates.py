@@ -2,4 +2,6 @@
 
 RATES = {
     "BlockCurl": (1.0, 0.1),
+    "BlockStack": (1.0, 0.0),
+    "BlockBalance": (0.98, 0.0),
 }
