@@ -22,6 +22,8 @@ SUITE = {
     "BlockPose": 300,
     "BallKick": 6,
     "BallJuggle": 300,
+    "BlockStack": 240,
+    "BlockBalance": 240,
 }
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""
 

@@ -7,4 +7,6 @@ RATES = {
     "BlockPose": (0.98, 0.0),
     "BallKick": (0.95, 0.05),
     "BallJuggle": (1.0, 0.0),
+    "BlockStack": (1.0, 0.0),
+    "BlockBalance": (0.98, 0.0),
 }
