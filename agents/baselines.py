@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from agents.algorithms import make_vector_env
 from rigid_env.envs.controllers import AXES, CONTROLLERS, Policy, load_controller, reach_controller, reorient_controller
+from rigid_env.envs.named import make_named
 
 __all__ = ["CONTROLLERS", "Policy", "baseline_policy", "random_policy", "reach_controller", "reorient_controller"]
 
@@ -33,8 +33,8 @@ def random_policy(seed: int = 0, axes: int = AXES) -> Policy:
 
 def action_size(env_id: str) -> int:
     """Return how many numbers an action of an environment has."""
-    env = make_vector_env(env_id, 1)
-    shape = env.single_action_space.shape
+    env = make_named(env_id)
+    shape = env.action_space.shape
     env.close()
     assert shape is not None  # actions of every environment are rows of numbers
     return shape[0]

@@ -66,7 +66,7 @@ def test_a_command_of_agents_runs_where_nothing_is_missing(tmp_path):
 
 
 def test_baselines_do_without_the_extra(tmp_path):
-    code = "import agents.baselines as b; print(b.baseline_policy('random', '').__name__)"
+    code = "import agents.baselines as b; print(b.baseline_policy('random', 'rigid_env/BlockReach-v0').__name__)"
     done = without(tuple(extras.EXTRAS["agents"]), tmp_path, "-c", code)
     assert done.returncode == 0, done.stderr
 
