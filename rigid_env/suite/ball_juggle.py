@@ -20,7 +20,7 @@ WANTED = (0.7, 1.3)  # height of the apex: the ball's centre over the block's pl
 TOLERANCE = 0.05  # of an apex [m]
 CLEARANCE = 0.3  # gap between ball and block that an apex needs to count [m]
 APEXES = 4  # in a row that are a success
-FLYING = 0.05  # gap above which the ball flies freely for sure [m]
+FLYING = 0.02  # gap above which the flight is read [m]
 RELEASE = (0.6, 1.0)  # height of the ball at the start [m]
 ASIDE, DRIFT = 0.1, 0.15  # largest offset from the block's centre [m] and speed [m/s] at the start, x and z each
 LENGTH, BALL_SPEED, BALL_SPIN = 1.0, 5.0, 10.0  # units of the observation [m], [m/s], [rad/s]
@@ -38,7 +38,7 @@ SPRING_TURN = (RATE * SIDE / 2) ** 2 / ((SIDE**2 + THICKNESS**2) / 12.0)  # the 
 
 
 def springs():
-    """Springs at the corners of the block's middle plane. Their anchors are straight above, where they carry it."""
+    """Springs at the corners of the block's middle plane, stretched upwards so far that they carry its weight."""
     corners = [(x * SIDE / 2, z * SIDE / 2) for x in (-1, 1) for z in (-1, 1)]
     stiffness, stretch = BLOCK_MASS * RATE**2 / 4, G / RATE**2
     return [
@@ -48,8 +48,9 @@ def springs():
 
 
 def gap(worlds):
-    """Gap between ball and block, along the vertical and as if the block were level, (n,) [m]."""
-    return worlds.pos[:, BALL, 1] - worlds.pos[:, BLOCK, 1] - TOUCHING
+    """Gap between the ball and the plane of the block's top (n,) [m]."""
+    up = worlds.rotation[:, BLOCK, :, 1]
+    return ((worlds.pos[:, BALL] - worlds.pos[:, BLOCK]) * up).sum(axis=1) - TOUCHING
 
 
 def apex_ahead(worlds):
