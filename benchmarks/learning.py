@@ -1,4 +1,4 @@
-"""Time to learn a task, beside a user of MuJoCo: ``python -m benchmarks.learning [--env ID] [--seeds N] [--threads N]``.
+"""Time to learn a task, beside a user of MuJoCo: ``python -m benchmarks.learning [--env ID] [--seeds N]``.
 
 Stable-Baselines3's PPO trains until a share of the last 500 training episodes succeeds. Ours trains as `agents.train`
 does, with its hyperparameters. The user of MuJoCo has 64 twins (`benchmarks.twins`) of one world each in a

@@ -1,8 +1,8 @@
 """MuJoCo twins of environments: our observations, rewards, success, starts and draws; MuJoCo computes the motion.
 
-A twin is an environment of `rigid_env` whose task has `MuJoCoSteps` in place of `rigid_env.tasks.steps.Steps`. Importing
-this module registers twins with Gymnasium: `twins/BlockReach-v0` is that of `rigid_env/BlockReach-v0`. Arguments are
-those of the original, and ``setting``, a key of `SETTINGS`.
+A twin is an environment of `rigid_env` whose task has `MuJoCoSteps` in place of `rigid_env.tasks.steps.Steps`. This
+module registers twins with Gymnasium: `twins/BlockReach-v0` is that of `rigid_env/BlockReach-v0`. Arguments are those
+of the original, and ``setting``, a key of `SETTINGS`.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def _check(task: Task) -> None:
     name, scene = type(task).__name__, task.world.scene
     odd = [type(effect).__name__ for effect in scene.effects if not isinstance(effect, EFFECTS)]
     if odd:
-        raise ValueError(f"effects of {name} contain {', '.join(odd)}; allowed in a twin are Gravity, Contact, Friction")
+        allowed = ", ".join(effect.__name__ for effect in EFFECTS)
+        raise ValueError(f"effects of {name} contain {', '.join(odd)}; allowed in a twin are {allowed}")
     contact = scene.effect(physics.Contact)
     if contact is not None and (contact.stiffness is not None or contact.tangential is not None):
         raise ValueError(f"effects of {name} contain {contact}; allowed in a twin is rigid contact without tangential")
@@ -161,7 +162,8 @@ class MuJoCoSteps:
         if not changed.any():
             return
         if not all(map(np.array_equal, self._given, (self._world.params, self._world.gravity))):
-            raise ValueError("physical parameters of an episode differ from the scene's; allowed in a twin are fixed ones")
+            told = "mass, size, friction, restitution or gravity of an episode differs from the scene's"
+            raise ValueError(f"{told}; allowed in a twin are the scene's")
         for world in np.flatnonzero(changed).tolist():
             self._places[world].write(self.model)
 
@@ -174,10 +176,8 @@ class _Place:
 
     def __init__(self, data, bodies: np.ndarray):
         self.data, self.wrench = data, data.xfrc_applied[1:]
-        ours = [
-            tuple(row[first : first + size] for first, size in ((at.POS, 3), (at.QUAT, 4), (at.LINVEL, 3), (at.ANGVEL, 3)))
-            for row in bodies
-        ]
+        columns = (at.POS, 3), (at.QUAT, 4), (at.LINVEL, 3), (at.ANGVEL, 3)
+        ours = [tuple(row[first : first + size] for first, size in columns) for row in bodies]
         theirs = [
             (q[:3], q[3:], v[:3], v[3:])
             for q, v in zip(data.qpos.reshape(len(bodies), 7), data.qvel.reshape(len(bodies), 6))
