@@ -205,7 +205,7 @@ def _register() -> None:
     for env in ORIGINALS:
         if twin_id(env) not in gym.registry:
             gym.register(
-                twin_id(env), f"{__name__}:make_env", vector_entry_point=f"{__name__}:make_batch", kwargs={"of": env},
+                twin_id(env), make_env, vector_entry_point=make_batch, kwargs={"of": env},
                 max_episode_steps=gym.spec(env).max_episode_steps, disable_env_checker=True,
             )  # fmt: skip
 
