@@ -47,8 +47,8 @@ def judge(env: str, name: str, episodes: int, seed: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``env``, ``policy`` (the file's name), ``judged``: by engine the numbers of `agents.evaluate.Episodes.summary`; and ``lost``: by
-        setting of MuJoCo the success rate in ours less that in MuJoCo.
+        ``env``, ``policy`` (the file's name), ``judged``: by engine the numbers of `agents.evaluate.Episodes.summary`;
+        and ``lost``: by setting of MuJoCo the success rate in ours less that in MuJoCo.
     """
     policy, seeds = read_policy(name, env), evaluation_seeds(seed, episodes)
     judged = {OURS: run_episodes(env, policy, seeds, threads=1, accuracy="balanced").summary()}
