@@ -1,13 +1,13 @@
-"""Policies judged in another engine: ``python -m benchmarks.judge_elsewhere [--policy FILE]... [--env ID]...``.
+"""Policies judged in another engine: ``python -m benchmarks.judge_elsewhere [--env ID]... [--policy ID=FILE]...``.
 
 A policy acts in the episodes of an environment and of its MuJoCo twin (`benchmarks.twins`): the same starts, goals,
-observations and success, another engine. The table shows the success that is lost. A policy is a file of
-`rigid_env.load_policy`, or ``controller``, the handwritten one of the environment, which needs no training.
+observations and success, another engine. The table shows the success that is lost. The first row of an environment is
+its handwritten controller, which needs no training; then come policies, files of `rigid_env.load_policy`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,8 +47,8 @@ def judge(env: str, name: str, episodes: int, seed: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``env``, ``policy``, ``judged``: by engine the numbers of `agents.evaluate.Episodes.summary`; and ``lost``: by
-        setting of MuJoCo the success rate in ours less that in MuJoCo.
+        ``env``, ``policy`` (the file's name), ``judged``: by engine the numbers of `agents.evaluate.Episodes.summary`;
+        and ``lost``: by setting of MuJoCo the success rate in ours less that in MuJoCo.
     """
     policy, seeds = read_policy(name, env), evaluation_seeds(seed, episodes)
     judged = {OURS: run_episodes(env, policy, seeds, threads=1, accuracy="balanced").summary()}
@@ -56,7 +56,7 @@ def judge(env: str, name: str, episodes: int, seed: int) -> dict[str, Any]:
         judged[setting] = run_episodes(twin_id(env), policy, seeds, threads=1, setting=setting).summary()
     ours = judged[OURS]["success_rate"]
     lost = {setting: ours - judged[setting]["success_rate"] for setting in SETTINGS}
-    return {"env": env, "policy": name, "judged": judged, "lost": lost}
+    return {"env": env, "policy": Path(name).name, "judged": judged, "lost": lost}
 
 
 def make_judged_table(rows: list[dict[str, Any]]) -> Table:
@@ -70,25 +70,40 @@ def make_judged_table(rows: list[dict[str, Any]]) -> Table:
         cells = [f"{row['judged'][OURS]['success_rate']:.1%}"]
         for setting in SETTINGS:
             cells += [f"{row['judged'][setting]['success_rate']:.1%}", f"{100.0 * row['lost'][setting]:+.1f}"]
-        table.add_row(row["env"].rpartition("/")[2], Path(row["policy"]).name, *cells)
+        table.add_row(row["env"].rpartition("/")[2], row["policy"], *cells)
     return table
+
+
+def chosen(envs: Sequence[str], policies: Sequence[str]) -> list[tuple[str, str]]:
+    """Pairs of environment and policy: the controller of each environment, then its policies, given as ``ID=FILE``.
+
+    Raises
+    ------
+    ValueError
+        An environment without a twin, or a policy in another form or of an environment that is not in `envs`.
+    """
+    for env in envs:
+        twin_id(env)
+    given = [text.partition("=") for text in policies]
+    for text, (env, _, file) in zip(policies, given):
+        if env not in envs or not file:
+            raise ValueError(f"policy is {text!r}; allowed is ID=FILE with one of {', '.join(envs)}")
+    return [(env, name) for env in envs for name in (CONTROLLER, *(file for of, _, file in given if of == env))]
 
 
 def main(
     env: Annotated[list[str] | None, typer.Option(help="Id of an environment with a twin.", show_default="all")] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(help="File of a policy of the environment, or controller.")
+        list[str] | None, typer.Option(metavar="ID=FILE", help="Policy of an environment besides its controller.")
     ] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Episodes of each evaluation.")] = EPISODES,
     seed: Annotated[int, typer.Option(min=0, help="Of the set of episodes.")] = 0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Where to write the result.")] = None,
 ) -> None:
     """Judge policies in MuJoCo: success in our engine, in its twins, and the success that is lost."""
-    console, rows = make_console(), []
+    console = make_console()
     try:
-        for each in env or ORIGINALS:
-            twin_id(each)
-            rows += [judge(each, name, episodes, seed) for name in policy or (CONTROLLER,)]
+        rows = [judge(each, name, episodes, seed) for each, name in chosen(env or ORIGINALS, policy or ())]
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     console.print(make_judged_table(rows))

@@ -133,4 +133,15 @@ def test_the_program_judges_a_controller(tmp_path):
         rates = (row["judged"][name]["success_rate"] for name in ("ours", setting))
         assert lost == np.subtract(*rates)
     assert CliRunner().invoke(app, ["--env", "rigid_env/BlockCurl-v0"]).exit_code != 0
-    assert CliRunner().invoke(app, ["--policy", str(tmp_path / "nothing.npz")]).exit_code != 0
+    missing = f"rigid_env/BlockReach-v0={tmp_path / 'nothing.npz'}"
+    assert CliRunner().invoke(app, ["--episodes", "1", "--policy", missing]).exit_code != 0
+
+
+def test_policies_follow_the_controller_of_their_environment():
+    reach, reorient = twins.ORIGINALS
+    given = [f"{reorient}=b.npz", f"{reach}=a.npz"]
+    found = judge_elsewhere.chosen(twins.ORIGINALS, given)
+    assert found == [(reach, "controller"), (reach, "a.npz"), (reorient, "controller"), (reorient, "b.npz")]
+    for wrong in ("a.npz", f"{reorient}=b.npz", f"{reach}="):
+        with pytest.raises(ValueError, match=f"policy is '{wrong}'; allowed is ID=FILE"):
+            judge_elsewhere.chosen([reach], [wrong])
