@@ -74,7 +74,7 @@ class BallKick(Task):
     mass they are up to 30 m/s ahead, up to 14 m/s across, and up to 3.5 m/s along the back of the ball. This last one
     leaves a spin of up to 80 rad/s. Then the ball flies alone, with drag, with lift across its spin, and with wind. A
     post of 3.5 m hides the ring. Within 1.2 s the ball gets there only around the post, on a way that spin bends, or
-    over it with topspin. Later actions have no effect.
+    over it with topspin, where ring and wind allow it. Later actions have no effect.
 
     Effects of other strength are arguments: `effects=[physics.Drag(0.0), physics.Magnus(0.0)]` is a flight without air.
     `draws={"wind": (0.0, 0.0)}` is a calm. A `physics.Wind` in `effects` needs such a fixed draw, and replaces it.

@@ -110,6 +110,24 @@ def test_the_post_is_in_the_way_of_a_kick_without_spin():
     assert rate(controller) == 1.0
 
 
+@pytest.mark.parametrize("wind", [-5.0, 0.0, 5.0])
+def test_only_topspin_brings_a_ball_over_the_post_in_time(wind):
+    """Kicks of a grid, straight ahead, at rings near and high, near and low, and far, by the model of the flight."""
+    ahead, up = (each.ravel() for each in np.meshgrid(np.linspace(8.0, 30.0, 45), np.linspace(0.0, 14.0, 57)))
+    velocity = np.stack([ahead, up, np.zeros_like(up)], axis=1)
+    for distance, height in ((16.0, 2.2), (16.0, 0.6), (22.0, 0.6)):
+        for spin in (0.0, -80.0):
+            vectors = (np.tile(each, (len(up), 1)) for each in ((0.0, 0.0, spin), (wind, 0.0, 0.0)))
+            places, duration = ball_kick.fly(velocity, *vectors, np.full(len(up), distance))
+            heights = places[:, :, 1] + RADIUS
+            is_over = heights[round(ball_kick.POST_SHARE * ball_kick.PARTS)] > ball_kick.POST[1] + RADIUS
+            is_hit = is_over & (np.abs(heights[-1] - height) < ball_kick.RING) & (duration < 1.2)
+            if spin == 0.0:
+                assert not is_hit.any()
+            elif (distance, height) == (16.0, 2.2):
+                assert is_hit.any()
+
+
 def test_later_actions_have_no_effect():
     envs = [gym.make(ENV).unwrapped for _ in range(2)]
     for env in envs:
