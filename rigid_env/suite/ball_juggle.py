@@ -73,9 +73,9 @@ class BallJuggle(Task):
     ## Rewards
 
     `progress`: the gain of a potential, whose sum over an episode depends on its start and end alone. The potential is
-    0.5 for each apex of the present run, minus 1 per metre between the apex of the present flight and the wanted one,
-    0.5 per metre between ball and block, sideways, 0.25 per m/s of the ball, sideways, and 0.5 times one minus the
-    cosine of the block's tilt. `lost`: minus 1 for a lost ball. `success`: 2.
+    0.5 for each apex of the present run. It loses 1 per metre between the apex of the present flight and the wanted
+    one. Sideways it loses 0.5 per metre between ball and block, and 0.25 per m/s of the ball. A tilt of the block
+    costs 0.5 times one minus its cosine. `lost`: minus 1 for a lost ball. `success`: 2.
 
     ## Starting State
 

@@ -71,9 +71,9 @@ class BlockLand(Task):
 
     ## Rewards
 
-    `progress`: the gain of a potential. With a the angle between the target face's normal and straight down [rad], v
-    the speed [m/s], w the spin [rad/s] and h the share of the hold completed, it is `-a - 0.1 (v + w) exp(-a / 0.3) +
-    h`. `peak`: minus 2 times the growth of the peak, which is the largest impulse that impacts gave the block in one
+    `progress`: the gain of the potential `-a - 0.1 (v + w) exp(-a / 0.3) + h`. Here a is the angle between the target
+    face's normal and straight down [rad], v the speed [m/s], w the spin [rad/s] and h the share of the hold completed.
+    `peak`: minus 2 times the growth of the peak, which is the largest impulse that impacts gave the block in one
     control step, over m g [s]. `time`: -0.02 in each step. `success`: 5.
 
     ## Starting State
@@ -83,10 +83,10 @@ class BlockLand(Task):
 
     ## Episode End
 
-    Success: on 5 control steps in a row the target face lies on the floor (within 0.03 rad and 0.03 m), at a speed of
-    at most 0.1 m/s and a spin of at most 0.1 rad/s. Failure: the budget is spent, and the block rests on another face.
-    Truncation after 120 control steps (6 s). `info` holds `angle` [rad], `speed` [m/s], `spin` [rad/s], `peak` [m g s]
-    and `left`, the rest of the budget [m g s].
+    Success: on 5 control steps in a row the target face lies on the floor, within 0.03 rad and 0.03 m, and the block
+    rests. At rest the speed is at most 0.1 m/s and the spin at most 0.1 rad/s. Failure: the budget is spent, and the
+    block rests on another face. Truncation after 120 control steps (6 s). `info` holds `angle` [rad], `speed` [m/s],
+    `spin` [rad/s], `peak` [m g s] and `left`, the rest of the budget [m g s].
 
     A face comes down by chance in one of six throws.
 

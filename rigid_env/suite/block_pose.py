@@ -83,17 +83,17 @@ class BlockPose(BlockTask):
     ## Description
 
     The block of `BlockReach` in the same box, acted upon by the same force and torque, at 50 ms for a control step. A
-    pose on the floor is wanted: the place of the centre, the face that is down, which is not the one at the start, and
-    the heading, which is the turn about the vertical, as `yaw` of a start. A heading that is half a turn off is wrong,
-    although the block looks the same. Tumbling onto the face also moves the block and turns it, so that each of the
-    three goals may undo another one.
+    pose on the floor is wanted: the place of the centre, the face that is down, and the heading. The face is not the
+    one at the start. The heading is the turn about the vertical, as `yaw` of a start. A heading that is half a turn off
+    is wrong, although the block looks the same. Tumbling onto the face also moves the block and turns it, so that each
+    of the three goals may undo another one.
 
     ## Rewards
 
-    `progress`: the gain of a potential. With d the horizontal distance of the centre from its place [m], b the tilt of
-    the target face [rad], a the angle of the whole turn that is left [rad], v the speed [m/s], w the spin [rad/s] and h
-    the share of the hold completed, it is `h - d/4 - a - b - 0.5 tanh(2 d) - 0.5 tanh(a / 0.3) - 0.1 (v + w) exp(-d - a
-    - b)`. `time`: -0.01 in each step. `success`: 5.
+    `progress`: the gain of the potential `h - d/4 - a - b - 0.5 tanh(2 d) - 0.5 tanh(a / 0.3) - 0.1 (v + w) exp(-d - a
+    - b)`. Here d is the horizontal distance of the centre from its place [m], and b the tilt of the target face [rad].
+    The whole turn that is left has the angle a [rad]. v is the speed [m/s], w the spin [rad/s] and h the share of the
+    hold completed. `time`: -0.01 in each step. `success`: 5.
 
     ## Starting State
 
@@ -104,7 +104,7 @@ class BlockPose(BlockTask):
     ## Episode End
 
     Success: on 10 control steps in a row the centre is within 0.3 m of its place, the target face's normal within 0.1
-    rad of straight down, the heading within 0.1 rad, the speed at most 0.1 m/s and the spin at most 0.1 rad/s.
+    rad of straight down, and the heading within 0.1 rad. The speed is at most 0.1 m/s then, the spin at most 0.1 rad/s.
     Truncation after 300 control steps (15 s). `info` holds `distance` [m], `tilt`, `heading_error` and `turn` [rad],
     `speed` [m/s] and `spin` [rad/s].
 

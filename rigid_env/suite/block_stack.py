@@ -60,9 +60,9 @@ class BlockStack(Task):
 
     ## Episode End
 
-    Success: A has been at rest on B for 2 s. In all of this time B carries at least half of its weight, its speed is
-    below 0.02 m/s, its spin below 0.02 rad/s, and its centre within 1 mm of its place when the rest began. Failure: B
-    has moved by more than 0.05 m, or turned by more than 0.05 rad. Truncation after 240 control steps (12 s). `info`
+    Success: A has been at rest on B for 2 s. In all of this time B carries at least half of its weight. The speed of A
+    is below 0.02 m/s, its spin below 0.02 rad/s, and its centre within 1 mm of its place when the rest began. Failure:
+    B has moved by more than 0.05 m, or turned by more than 0.05 rad. Truncation after 240 control steps (12 s). `info`
     holds `distance` of A from its place on B [m], `moved` of B [m] and `held` [s].
 
     ## Version History
