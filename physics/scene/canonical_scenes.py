@@ -120,7 +120,7 @@ def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
 
 
 def rolling_sphere(speed: float = 5.0, friction: float = 0.2) -> Scene:
-    """A sphere of radius 1 m and 1 kg slides over the floor at `speed` [m/s] until it rolls, at 5/7 of that speed."""
+    """A sphere of radius 1 m and 1 kg slides over the floor until it rolls, at 5/7 of its speed [m/s]."""
     body = Sphere(1.0, 1.0, pos=(0.0, 1.0, 0.0), linvel=(speed, 0.0, 0.0))
     return Scene([body], [HalfSpace((0, 1, 0))], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 

@@ -20,6 +20,7 @@ import physics
 from agents.algorithms import CLASSES, algorithm_arguments
 from agents.config import ALGORITHMS, HYPERPARAMETERS, RunFolder, change, make_config
 from agents.features import FINE, GoalDifference
+from rigid_env.envs.registration import SUITE
 
 TABLE = yaml.safe_load(HYPERPARAMETERS.read_text(encoding="utf-8"))
 ENTRIES = [(env, algo) for env, entry in TABLE.items() for algo in entry]
@@ -29,7 +30,9 @@ OURS = {"policy", "env", "seed", "device"}  # set by make_model
 
 def test_every_environment_has_every_algorithm():
     with_rewards = {(f"rigid_env/{name}-v0", algo) for name in ("BlockReach", "BlockReorient") for algo in ALGORITHMS}
-    assert set(ENTRIES) == with_rewards | {("rigid_env/BlockReachGoal-v0", "sac")}  # hindsight needs a replay buffer
+    of_suite = {(f"rigid_env/{name}-v0", "ppo") for name in SUITE}
+    # hindsight needs a replay buffer
+    assert set(ENTRIES) == with_rewards | of_suite | {("rigid_env/BlockReachGoal-v0", "sac")}
 
 
 @pytest.mark.parametrize(("env", "algo"), ENTRIES)

@@ -29,7 +29,7 @@ runner = CliRunner()
 COMMANDS = {
     "demo": (), "run": ("rest",), "replay": ("none.npz",), "explain": ("rest",), "warmup": (), "bench": (),
     "effects": (), "accuracy": (), "tosses": ("none.npz",), "hard-cases": (), "describe": ("rigid_env/BlockReach-v0",),
-    "view": ("rest",), "scenes": (),
+    "view": ("rest",), "play": ("rigid_env/BlockReach-v0",), "scenes": (),
 }  # fmt: skip
 
 CART = Path(__file__).parents[2] / "examples" / "cart.toml"
@@ -101,7 +101,7 @@ def written_options():
 
 
 def test_every_command_that_measures_has_json():
-    assert {name for name, option in written_options() if option == "--json"} == set(COMMANDS) - {"view"}
+    assert {name for name, option in written_options() if option == "--json"} == set(COMMANDS) - {"view", "play"}
 
 
 ENDINGS = {
@@ -111,6 +111,7 @@ ENDINGS = {
     "--plot": ".png",
     "--markdown": ".md",
     "--export": ".html",
+    "--video": ".gif",
 }
 
 

@@ -125,8 +125,8 @@ AGENTS = [
         "agents-interval",
         "The confidence interval of a success rate is too wide.",
         "agents/interval.py",
-        "+ weight / 4))",
-        "+ weight / 2))",
+        "CONFIDENCE = 0.95",
+        "CONFIDENCE = 0.99",
         "agents/test_interval.py::test_newcombe_1998_table_1_method_3",
     ),
     _mutant(

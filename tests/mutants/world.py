@@ -137,7 +137,7 @@ IO = [
     _mutant(
         "io-default",
         "A scene file leaves out parameters that are zero, whatever their default.",
-        "io/toml.py",
+        "io/plain.py",
         "if field.default is MISSING or value != field.default:",
         "if field.default is MISSING or (value != field.default and value != 0.0):",
         "test_scene_file.py::test_a_scene_comes_back_equal",

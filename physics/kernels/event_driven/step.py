@@ -3,10 +3,10 @@
 A substep goes from event to event through these parts, until its time is used up. y = (x, q, v, L) is the state, M its
 mass and inertia, f the load, J the Jacobian of the contacts, u their velocities, p their impulses, λ their forces.
 
-1. Evaluate loads     f = f(y, t), anew at every state of the integration                  `held_loads.refresh_loads`
+1. Hold loads         f = f(y, t), anew at every state of the integration                  `held_loads.refresh_loads`
 2. Find contacts      the contact mode: contacts that touch, and which stick and slide     `classify_mode`
 3. Resolve impacts    M Δ(v, ω) = Jᵀ p, u_n⁺ >= -e u_n⁻ ⟂ p_n >= 0, |p_t| <= μ p_n         `resolve_impacts`
-4. Limit the motion   the first t at which a guard (gap, push, cone, speed) is zero        `guards`, `time_of_impact`
+4. Limit the stage    the first t at which a guard (gap, push, cone, speed) is zero        `guards`, `time_of_impact`
 5. Integrate          in the air the exact flow to the next wall                           `fly_to_wall`
                       in contact M v̇ = f + Jᵀ λ with u̇_n = 0, u̇_t = 0 or λ_t = -μ λ_n d,   `integrate_segment`
                       extrapolated to the tolerance
