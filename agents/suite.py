@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 
 from agents.accuracy_transfer import parse_accuracies
@@ -24,7 +23,7 @@ from agents.curve import read_curve
 from agents.evaluate import evaluate
 from agents.interval import bootstrap, interquartile_mean
 from agents.run import EVALUATION_EPISODES
-from agents.sweep import INTERRUPTED, complete, sweep
+from agents.sweep import complete, sweep, told_ends
 from agents.trials import Trial, make_trials, parse_seeds
 from physics.accuracy import PRESETS
 from rigid_env.lab.measure.machine import write_json
@@ -90,11 +89,11 @@ def write_trial(results: Path, trial: Trial, out: Path, result: dict[str, Any], 
 
 
 def is_written(path: Path, result: dict[str, Any] | None = None) -> bool:
-    """Return whether a file of results is there, of this very result of a trial."""
+    """Return whether a file of results is there; with `result`, of this very result of a trial, and judged."""
     if not path.is_file():
         return False
     kept = json.loads(path.read_text(encoding="utf-8"))
-    return result is None or kept["evaluation"] == result["evaluation"]
+    return result is None or (kept["evaluation"] == result["evaluation"] and bool(kept["judged"]))
 
 
 # --- the command -----------------------------------------------------------------------------------------------------
@@ -183,16 +182,11 @@ def main(
             raise ValueError(
                 "launcher is 'print', which runs nothing; allowed is agents.sweep with it, and then this one"
             )
-        ends = sweep(trials, out.resolve(), place.launch, jobs, address, console)
-        errors = write_results(trials, out.resolve(), results, place, console)
+        with told_ends(console):
+            ends = sweep(trials, out.resolve(), place.launch, jobs, address, console)
+            errors = write_results(trials, out.resolve(), results, place, console)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    except DependencyNotInstalled as error:
-        console.print(f"Error: {error}", soft_wrap=True)
-        raise typer.Exit(1) from None
-    except KeyboardInterrupt:
-        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
-        raise typer.Exit(INTERRUPTED) from None
     console.print(make_table(env_ids, results))
     errors += [f"{each.name}: {each.error}" for each in ends if each.result is None]
     for error in errors:

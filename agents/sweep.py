@@ -6,7 +6,8 @@ is `agents.train.run_or_resume`. What is complete stands in ``DIR/results.json``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -118,6 +119,19 @@ def make_table(ends: Sequence[Ended]) -> Table:
     return table
 
 
+@contextmanager
+def told_ends(console: Console) -> Iterator[None]:
+    """Turn a missing library and Ctrl-C into a message and an exit status."""
+    try:
+        yield
+    except DependencyNotInstalled as error:
+        console.print(f"Error: {error}", soft_wrap=True)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
+        raise typer.Exit(INTERRUPTED) from None
+
+
 def main(
     env: Annotated[list[str], typer.Argument(help="Gymnasium ids, or module:id.", show_default=False)],
     seeds: Annotated[str, typer.Option(help="Numbers and ranges: 0-4 or 1,3,7.")] = "0",
@@ -156,14 +170,8 @@ def main(
         raise typer.BadParameter(str(error)) from error
     if scheduler is not None:
         launch = partial(asha.launch, trials)
-    try:
+    with told_ends(console):
         ends = sweep(trials, out.resolve(), launch, jobs, address, console)
-    except DependencyNotInstalled as error:
-        console.print(f"Error: {error}", soft_wrap=True)
-        raise typer.Exit(1) from None
-    except KeyboardInterrupt:
-        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
-        raise typer.Exit(INTERRUPTED) from None
     if ends:
         write_json(out / "results.json", {"trials": [each._asdict() for each in ends]})
         console.print(make_table(ends))

@@ -46,14 +46,14 @@ def twin_id(env: str) -> str:
 def make_env(of: str, setting: str = "default", **arguments: Any) -> gym.Env:
     """Make the single twin of the environment with the id `of`; the other arguments are those of the original."""
     env = gym.make(of, disable_env_checker=True, **arguments).unwrapped
-    hand_motion(env.task, setting)  # type: ignore[attr-defined]
+    hand_motion(env.task, setting)
     return env
 
 
 def make_batch(of: str, num_envs: int, setting: str = "default", **arguments: Any) -> gym.vector.VectorEnv:
     """Make a batch of twins of the environment with the id `of`; the other arguments are those of the original."""
     env = gym.make_vec(of, num_envs=num_envs, vectorization_mode="vector_entry_point", **arguments)
-    hand_motion(env.task, setting)  # type: ignore[attr-defined]
+    hand_motion(env.task, setting)
     return env
 
 
@@ -74,7 +74,7 @@ def hand_motion(task: Task, setting: str = "default") -> None:
     if setting not in SETTINGS:
         raise ValueError(f"setting is {setting!r}; allowed are {', '.join(SETTINGS)}")
     _check(task)
-    task._advance = MuJoCoSteps(task, SETTINGS[setting])  # type: ignore[assignment]
+    task._advance = MuJoCoSteps(task, SETTINGS[setting])
 
 
 def _check(task: Task) -> None:

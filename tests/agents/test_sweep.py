@@ -21,10 +21,11 @@ pytest.importorskip("stable_baselines3")
 
 from agents import run as runs
 from agents import sweep as program
-from agents import train
+from agents import train, worker
 from agents.config import RunInUse
 from agents.run import run_or_resume
 from agents.sweep import complete, sweep
+from agents.training import Interrupted
 from agents.trials import make_trials, parse_grid, parse_seeds
 from agents.worker import make_job, run_trial
 from rigid_env.launchers import local, printed
@@ -264,6 +265,15 @@ def test_local_jobs_of_submitit_have_the_same_results(trials, tmp_path):
     sweep(trials, one, in_turn, 1, None, QUIET)
     sweep(trials, two, submitit_jobs.launch, 2, "local", QUIET)
     assert results(one, trials) == results(two, trials)
+
+
+def test_ctrl_c_in_a_worker_ends_the_sweep_and_fails_no_trial(trials, tmp_path, monkeypatch):
+    def interrupted(*given, **named):
+        raise Interrupted("go on with ...")
+
+    monkeypatch.setattr(worker, "run_or_resume", interrupted)
+    with pytest.raises(KeyboardInterrupt, match="go on with"):
+        sweep(trials, tmp_path, in_turn, 1, None, QUIET)
 
 
 def test_a_run_in_use_is_not_written_into(trials, tmp_path, short):
