@@ -35,9 +35,10 @@ class Checkout:
     It is killed where an answer takes longer than `patience` [s], or its end longer than `ending` [s].
     """
 
-    patience, ending = PATIENCE, ENDING
+    ending = ENDING
 
-    def __init__(self, folder: Path, compiler: str | None = None, worker: Path = WORKER):
+    def __init__(self, folder: Path, compiler: str | None = None, worker: Path = WORKER, patience: float = PATIENCE):
+        self.patience = patience
         environment = {**os.environ, "PYTHONPATH": str(folder)}
         if compiler is not None:
             environment[VARIABLE] = compiler
@@ -90,28 +91,28 @@ def main(
     steps: Annotated[int, typer.Option(min=1, help="Of each run, in parts of 25.")] = STEPS,
     compiler: Annotated[str | None, typer.Option(help=f"Of {', '.join(COMPILERS)}.")] = None,
     other_compiler: Annotated[str | None, typer.Option(help="Likewise, over the other checkout.")] = None,
-    json: Annotated[Path | None, typer.Option(help="Where to write the result.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Where to write the result, after each run.")] = None,
+    patience: Annotated[float, typer.Option(min=1.0, help="Time limit for a run [s].")] = PATIENCE,
 ) -> None:
     """Compare the states of 24 scenes at four presets with those of another commit; exit with 1 where one differs."""
     for each in (compiler, other_compiler):
         if each not in (None, *COMPILERS):
             raise typer.BadParameter(f"{each} is no compiler; allowed are {', '.join(COMPILERS)}")
     pairs = [(name, level) for name in scene or SCENES for level in preset or PRESETS]
-    found = {}
-    with Checkout(Path(__file__).parents[1], compiler) as here, Checkout(other.resolve(), other_compiler) as there:
+    found: dict[str, str] = {}
+    folders = ((Path(__file__).parents[1], compiler), (other.resolve(), other_compiler))
+    here, there = (Checkout(folder, by, patience=patience) for folder, by in folders)
+    with here, there:
         for name, level in track(pairs, description="scenes"):
             here.ask(name, level, steps)
             there.ask(name, level, steps)
-            found[f"{name} {level}"] = verdict(here.answer(), there.answer())
-    different = {run: how for run, how in found.items() if how != "same"}
-    for run, how in different.items():
-        typer.echo(f"{run}: {how}")
+            found[f"{name} {level}"] = how = verdict(here.answer(), there.answer())
+            typer.echo(f"{name} {level}: {how}")
+            if json is not None:
+                compilers = [compiler, other_compiler]
+                write_json(json, {"name": "same_bits", "steps": steps, "compilers": compilers, "runs": found})
+    different = [run for run, how in found.items() if how != "same"]
     typer.echo(f"{len(found) - len(different)} of {len(found)} runs of {steps} steps have the same bits")
-    if json is not None:
-        write_json(json, {
-            "name": "same_bits", "steps": steps,
-            "compilers": [compiler, other_compiler], "runs": found,
-        })  # fmt: skip
     raise typer.Exit(1 if different else 0)
 
 
