@@ -67,6 +67,20 @@ def write_wall_coefficients(params: np.ndarray, shape: tuple[int, int], plan: Pl
         _write_wall_column(params, shape, plan, RESTITUTION, "wall_restitution", restitution, validation.share)
 
 
+def wall_coefficients(rows: np.ndarray, plan: Plan) -> dict[str, np.ndarray]:
+    """Frictions and restitutions of walls in k worlds, by name, each (k, walls); nan: the wall has none of its own.
+
+    `rows` (k, ...) are the parameters of one body of each world. Empty if the scene has no coefficients of walls.
+    """
+    if not plan.material_columns:
+        return {}
+    first = _first_column(rows, plan) + OF_WALL
+    return {
+        name: rows[:, first + which : first + plan.material_columns : WALL_COLUMNS]
+        for name, which in (("friction", FRICTION), ("restitution", RESTITUTION))
+    }
+
+
 def _needs(name: str, acts: bool | None, plan: Plan) -> None:
     """Raise a ValueError unless the effect acts and walls have coefficients in the scene."""
     if not acts or not plan.material_columns:
