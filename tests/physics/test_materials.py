@@ -119,8 +119,8 @@ def slide_on_plank(accuracy, block, plank, rule, pairs=(), between=True):
     return world.pos[0, 1, 0] - world.pos[0, 0, 0]
 
 
-# At `precise` bodies in contact have error control. Its tolerance is that of the preset for each of the 100 or so parts of a
-# motion, of some metres: 100 · 1e-10 · 1 m.
+# At `precise` bodies in contact have error control. Its tolerance is that of the preset for each of the 100 or so parts
+# of a motion, of some metres: 100 · 1e-10 · 1 m.
 NEAR_OF_TWO = {"fast": 1e-4, "balanced": 1e-4, "precise": 1e-8}
 
 
