@@ -26,6 +26,15 @@ Preset = Literal["fast", "balanced", "precise", "reference"]
 SchemeName = Literal["events", "exact", "explicit_euler", "semi_implicit_euler", "midpoint", "rk4"]
 """Name of an integration scheme, as `physics.Accuracy` explains them."""
 
+Rule = Literal["minimum", "average", "geometric_mean", "product", "maximum"]
+"""Name of a rule that combines the coefficients of two bodies, or of a body and a wall."""
+
+End = str | int
+"""End of a contact: name of a body or wall, or index of a body, or -1 - k for wall k."""
+
+Pair = tuple[End, End, float]
+"""Two ends of a contact, and a coefficient of theirs."""
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 """Type variable for decorators that return a function of the same signature."""
 

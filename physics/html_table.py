@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import fields
 from html import escape
 from typing import Any
 
 import numpy as np
 
-from physics.summary import LONGEST_VALUE, SCREEN, HasParts, shown
+from physics.summary import LONGEST_VALUE, SCREEN, HasParts, shown, shown_fields
 
 LARGEST = 4096
 """Largest size of the HTML of a table [bytes of UTF-8]; further rows are left out."""
@@ -65,8 +64,7 @@ def parts_table(item: HasParts, *more: tuple[str, str]) -> str:
 
 def fields_table(item: Any) -> str:
     """HTML table of a dataclass object: a row for each field that its `repr` shows."""
-    values = ((field.name, getattr(item, field.name)) for field in fields(item) if field.repr)
-    return table(type(item).__name__, ((name, _value(value)) for name, value in values))
+    return table(type(item).__name__, ((name, _value(value)) for name, value in shown_fields(item)))
 
 
 def _value(value: object) -> str:

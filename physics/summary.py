@@ -6,13 +6,16 @@ import reprlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import fields
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 # Most characters of a value in a message: two lines of a narrow terminal. Most characters of a line of a `repr`.
 LONGEST_VALUE = 160
 LINE = 80
+
+# Metadata of a dataclass field that `fields_repr` leaves out at its default: one that few objects need.
+SHOWN_IF_GIVEN = {"shown if given": True}
 
 # Characters that fit on a screen: ten lines.
 SCREEN = 10 * LINE
@@ -60,9 +63,22 @@ def shown(value: object, longest: int = LONGEST_VALUE) -> str:
     return f"{text[: longest - tail - 5]} ... {text[-tail:]}"
 
 
+def shown_fields(item: Any) -> list[tuple[str, Any]]:
+    """Names and values of the fields of a dataclass object that its `repr` shows.
+
+    A field with the metadata `SHOWN_IF_GIVEN` is left out while it has its default.
+    """
+    return [
+        (field.name, value)
+        for field in fields(item)
+        if field.repr
+        and ((value := getattr(item, field.name)) is not field.default or field.metadata != SHOWN_IF_GIVEN)
+    ]
+
+
 def fields_repr(item) -> str:
     """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value."""
-    parts = [(field.name, getattr(item, field.name)) for field in fields(item) if field.repr]
+    parts = shown_fields(item)
     name = type(item).__qualname__
     text = f"{name}({', '.join(f'{key}={value!r}' for key, value in parts)})"
     if len(text) <= SCREEN:

@@ -9,6 +9,8 @@ from physics.kernels.state.sleeping import SLEEP_SIZE
 from physics.scene.effects import Actuator, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot
 from physics.scene.force_fields import FIELDS
+from physics.scene.materials import has_restitution
+from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE
 
 
 @dataclass(frozen=True)
@@ -51,21 +53,42 @@ def _between_row(scene, contact, many) -> Row:
     return Row("body contact", False, "declared without contact between bodies", "")
 
 
-def _friction_row(friction, rubbing) -> Row:
-    if rubbing:
+def _own_coefficients(scene, name, pairs, rule, usual) -> str:
+    """Text about the coefficients called `name` that bodies, walls and pairs have of their own, and about their rule.
+
+    It is "" if there are none, and the rule is the `usual` one.
+    """
+    bodies, walls = (sum(getattr(each, name) is not None for each in items) for items in (scene.bodies, scene.walls))
+    counts = ((bodies, "body", "bodies"), (walls, "wall", "walls"), (len(pairs), "pair", "pairs"))
+    told = [f"{count} {one if count == 1 else several}" for count, one, several in counts if count]
+    return f"; own of {', '.join(told)}" * bool(told) + f"; rule {rule}" * bool(told or rule != usual)
+
+
+def _per_wall(needs) -> str:
+    return ", a number per wall" * needs.walls_differ
+
+
+def _friction_row(scene, needs) -> Row:
+    friction = needs.friction
+    if needs.rubbing:
         cone = "circular cone" if friction.axis is None else "elliptic cone"
-        return Row("friction", True, f"declared: μ = {friction.coefficient}", f"three rows per contact, {cone}")
+        own = _own_coefficients(scene, "friction", friction.pairs, friction.rule, FRICTION_RULE)
+        reason = f"declared: μ = {friction.coefficient}{own}"
+        return Row("friction", True, reason, f"three rows per contact, {cone}{_per_wall(needs)}")
     if friction is not None:
         return Row("friction", False, "declared, but nothing can touch", "")
     return Row("friction", False, "not declared", "")
 
 
-def _restitution_row(contact, touching) -> Row:
-    if contact is None or contact.restitution is None:
+def _restitution_row(scene, needs) -> Row:
+    contact = needs.contact
+    if not has_restitution(scene):
         return Row("restitution", False, "not declared: impacts are plastic", "")
-    if not touching:
+    if not needs.touching:
         return Row("restitution", False, "declared, but nothing can touch", "")
-    return Row("restitution", True, f"declared: e = {contact.restitution}", "Newton's law at impacts")
+    own = _own_coefficients(scene, "restitution", contact.restitution_pairs, contact.restitution_rule, RESTITUTION_RULE)
+    reason = f"declared: e = {contact.restitution or 0.0}{own}"
+    return Row("restitution", True, reason, f"Newton's law at impacts{_per_wall(needs)}")
 
 
 def _gyroscopic_row(isotropic, turned) -> Row:
@@ -151,7 +174,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
 
     `refined` tells whether error control cuts substeps into parts.
     """
-    contact, friction, touching, rubbing = needs.contact, needs.friction, needs.touching, needs.rubbing
+    contact, touching = needs.contact, needs.touching
     return (
         _gravity_row(needs.gravity),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
@@ -159,8 +182,8 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
         _sleeping_row(scene, touching, needs.sleeping),
         _contact_row(scene, contact),
         _between_row(scene, contact, needs.meeting),
-        _friction_row(friction, rubbing),
-        _restitution_row(contact, touching),
+        _friction_row(scene, needs),
+        _restitution_row(scene, needs),
         _tangential_row(contact, needs.laws),
         _compliance_row(contact, needs.laws),
         _resistance_row(scene, RollingFriction, LAW_ROLLING, needs.laws),

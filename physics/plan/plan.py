@@ -44,7 +44,7 @@ class Plan(Switches):
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
-            self.hulls, self.sleeping, self.features,
+            self.hulls, self.sleeping, self.features, self.material_columns > 0, self.walls_differ, self.pair_materials,
             *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -53,11 +53,6 @@ class Plan(Switches):
     def may_raise(self) -> bool:
         """True if a step may end in an exception, raised by a function of a user's field."""
         return any(slot.may_raise for slot in self.fields)
-
-    @property
-    def field_columns(self) -> int:
-        """Number of columns of the force fields in the parameter table."""
-        return sum(term.count * term.size for term in self.terms)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
         """True for bodies with whose inertia the kernel of this plan can compute the rotation.
@@ -105,7 +100,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
     return Plan(
         contact=needs.touching or None,
         friction=needs.rubbing or None,
-        restitution=(needs.touching and needs.contact.restitution is not None) or None,
+        restitution=needs.rebounding or None,
         gravity=(needs.gravity is not None) or None,
         gyroscopic=(not needs.isotropic) or None,
         offset_frame=(needs.turned or bool(needs.uneven)) or None,
@@ -118,6 +113,9 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         features=needs.features,
         fields=needs.fields,
         laws=needs.laws,
+        material_columns=needs.material_columns,
+        walls_differ=needs.walls_differ or None,
+        pair_materials=needs.pair_materials or None,
         scheme=scheme,
         rows=make_rows(scene, accuracy, needs, scheme.is_error_controlled and needs.touching),
     )

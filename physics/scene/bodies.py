@@ -15,7 +15,7 @@ from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
-from physics.summary import fields_repr, shown
+from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
 
 FROM_DENSITY: Any = None  # default of `mass`, replaced by density times volume when the body is made
 
@@ -24,10 +24,21 @@ def _tuple(array: ArrayLike) -> Any:
     return tuple(float(v) for v in np.ravel(array))
 
 
-def check_name(name: str) -> None:
-    """Raise a ValueError if a body's name is no text, is empty, or has unprintable characters or outer blanks."""
+def check_name(name: str, field: str = "name") -> None:
+    """Raise a ValueError for a name that is no text, is empty, or has unprintable characters or outer blanks."""
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable():
-        raise ValueError(f"name is {shown(name)}; allowed are printable characters, no blank at the ends")
+        raise ValueError(f"{field} is {shown(name)}; allowed are printable characters, no blank at the ends")
+
+
+def check_coefficients(item: Any, prefix: str = "") -> None:
+    """Check `friction` and `restitution` of a body or wall, and make them floats unless they are None.
+
+    `prefix` stands before the name of the field in an error.
+    """
+    for name, check in (("friction", validation.non_negative), ("restitution", validation.share)):
+        value = getattr(item, name)
+        if value is not None:
+            object.__setattr__(item, name, float(check(value, (), prefix + name)))
 
 
 if TYPE_CHECKING:
@@ -58,10 +69,6 @@ else:
 class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
 
-    The coefficients of friction and restitution are those of the scene's `Friction` and `Contact`, or those that
-    `World.set_parameters` gives to each body. Two bodies that touch have the geometric mean of their frictions and the
-    larger restitution; at a wall the body's own coefficients act.
-
     Parameters
     ----------
     pos, quat, linvel, angvel : array_like
@@ -72,7 +79,12 @@ class Body(_Shape):
     density : float, optional
         Density [kg/m³], given instead of `mass`, which becomes density times `volume`. The attribute is then None.
     name : str, optional
-        Name of the body in files and environments; no other body of a scene may have it. It changes no motion.
+        Name of the body in files and environments; no other body or wall of a scene may have it. It changes no motion.
+    friction, restitution : float, optional
+        Coefficients μ, at least 0, and e, from 0 to 1. None: those of the scene's `Friction` and `Contact`, without
+        which a scene has no friction and no contact. `World.set_parameters` changes them in each world. In a contact of
+        two bodies `Friction.rule` and `Contact.restitution_rule` combine both, and at a wall with a coefficient, too.
+        At a wall without one the body's own acts.
 
     Raises
     ------
@@ -87,6 +99,8 @@ class Body(_Shape):
     inertia_body: tuple[Vector, Vector, Vector] | None = None
     density: float | None = field(default=None, repr=False, compare=False)
     name: str | None = None
+    friction: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
+    restitution: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     _repr_html_ = fields_table
@@ -103,6 +117,7 @@ class Body(_Shape):
             self._set("inertia_body", tuple(map(_tuple, tensor)))
         if self.name is not None:
             check_name(self.name)
+        check_coefficients(self)
         self._check_range()
 
     def _set_mass(self) -> None:
@@ -157,6 +172,7 @@ class Block(Body):
     mass: float = FROM_DENSITY
     center: Vector = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
+    __repr__ = fields_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -172,6 +188,8 @@ class Block(Body):
             inertia_body: ArrayLike | None = None,
             density: float | None = None,
             name: str | None = None,
+            friction: float | None = None,
+            restitution: float | None = None,
             center: ArrayLike = ...,
         ) -> None: ...
 
@@ -225,6 +243,7 @@ class Sphere(Body):
     radius: float
     mass: float = FROM_DENSITY
     kind = "sphere"
+    __repr__ = fields_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -240,6 +259,8 @@ class Sphere(Body):
             inertia_body: ArrayLike | None = None,
             density: float | None = None,
             name: str | None = None,
+            friction: float | None = None,
+            restitution: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -286,6 +307,7 @@ class Ellipsoid(Body):
     semi_axes: Vector
     mass: float = FROM_DENSITY
     kind = "ellipsoid"
+    __repr__ = fields_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -301,6 +323,8 @@ class Ellipsoid(Body):
             inertia_body: ArrayLike | None = None,
             density: float | None = None,
             name: str | None = None,
+            friction: float | None = None,
+            restitution: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -372,6 +396,8 @@ class Hull(Body):
             inertia_body: ArrayLike | None = None,
             density: float | None = None,
             name: str | None = None,
+            friction: float | None = None,
+            restitution: float | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -7,18 +7,20 @@ Force fields (drag, springs and others) are in `physics.scene.force_fields`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.annotations import Effect, Vector
+from physics.annotations import Effect, End, Pair, Rule, Vector
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.scene.force_field import Field
-from physics.summary import fields_repr, shown
+from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE, checked_pairs, checked_rule
+from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
 
 
 @known_keywords
@@ -54,8 +56,8 @@ class Contact(Effect):
     ----------
     restitution : float, optional
         Newton's coefficient e in [0, 1]: the normal velocity after an impact is -e times the one before it. None:
-        impacts are plastic and the kernel holds no restitution. Where bodies have coefficients of their own
-        (`World.set_parameters`), two bodies take the larger one; at a wall the body's own acts.
+        impacts are plastic and the kernel holds no restitution, unless a body, a wall or a pair has a coefficient.
+        It is that of all bodies without a `Body.restitution`.
     between_bodies : bool, optional
         True: bodies touch walls and each other. False: they touch walls only, and pass through each other.
     tangential : float, optional
@@ -69,6 +71,11 @@ class Contact(Effect):
     damping : float, optional
         c of a damper beside the spring [N s/m]; at least 0. Spring and damper together never pull (Kelvin and Voigt's
         model, without adhesion).
+    restitution_rule : str, optional
+        Rule that combines the restitutions of two bodies, or of a body and a wall with a restitution: ``"minimum"``,
+        ``"average"``, ``"geometric_mean"``, ``"product"`` or ``"maximum"``.
+    restitution_pairs : dict or sequence, optional
+        Exceptions to the rule, as `Friction.pairs` has them.
     """
 
     restitution: float | None = None
@@ -76,7 +83,24 @@ class Contact(Effect):
     tangential: float | None = None
     stiffness: float | None = None
     damping: float = 0.0
+    restitution_rule: Rule = field(default=RESTITUTION_RULE, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    restitution_pairs: tuple[Pair, ...] = field(default=(), kw_only=True, metadata=SHOWN_IF_GIVEN)
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            restitution: float | None = None,
+            between_bodies: bool = True,
+            tangential: float | None = None,
+            stiffness: float | None = None,
+            damping: float = 0.0,
+            *,
+            restitution_rule: Rule = "maximum",
+            restitution_pairs: Mapping[tuple[End, End], float] | Iterable[Sequence[End | float]] = (),
+        ) -> None: ...
+
+    __repr__ = fields_repr
     _repr_html_ = fields_table
 
     def __post_init__(self) -> None:
@@ -90,6 +114,9 @@ class Contact(Effect):
             object.__setattr__(self, "tangential", validation.number(self.tangential, "Contact.tangential"))
             if not -1.0 <= self.tangential <= 1.0:
                 raise ValueError(f"Contact.tangential is {self.tangential}; allowed are numbers from -1 to 1")
+        checked_rule(self.restitution_rule, "Contact.restitution_rule")
+        pairs = checked_pairs(self.restitution_pairs, "Contact.restitution_pairs", validation.share)
+        object.__setattr__(self, "restitution_pairs", pairs)
         self._check_springs()
 
     def _check_springs(self) -> None:
@@ -99,11 +126,11 @@ class Contact(Effect):
                 raise ValueError(f"Contact.damping is {self.damping}; allowed without a stiffness is 0")
             return
         object.__setattr__(self, "stiffness", float(validation.positive(self.stiffness, (), "Contact.stiffness")))
-        for name in ("restitution", "tangential"):
-            if getattr(self, name) is not None:
+        for name, nothing in (("restitution", None), ("tangential", None), ("restitution_pairs", ())):
+            if getattr(self, name) != nothing:
                 raise ValueError(
-                    f"Contact.{name} is {getattr(self, name)} with a stiffness; allowed is None: springs and dampers "
-                    "say how a body bounces"
+                    f"Contact.{name} is {getattr(self, name)} with a stiffness; allowed is {nothing}: springs and "
+                    "dampers say how a body bounces"
                 )
 
 
@@ -115,22 +142,38 @@ class Friction(Effect):
     Parameters
     ----------
     coefficient : float or (2,) array_like
-        μ, the same for sticking and sliding; at least 0. Where bodies have coefficients of their own
-        (`World.set_parameters`), two bodies take the geometric mean; at a wall the body's own acts. Two coefficients,
-        greater than 0, describe walls with a grain: μ1 acts along `axis` and μ2 across it. The possible friction
-        forces then fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n². A sliding contact has the force of them that
-        dissipates most (Goyal, Ruina and Papadopoulos 1991).
+        μ, the same for sticking and sliding; at least 0. It is that of all bodies without a `Body.friction`. Two
+        coefficients, greater than 0, describe walls with a grain: μ1 acts along `axis` and μ2 across it. The possible
+        friction forces then fill the ellipse (f1/μ1)² + (f2/μ2)² <= f_n². A sliding contact has the force of them that
+        dissipates most (Goyal, Ruina and Papadopoulos 1991). Coefficients of bodies, walls and pairs are then μ1, and
+        the ratio μ2/μ1 is the same everywhere.
     axis : (3,) or (walls, 3) array_like, optional
         Direction of μ1, world frame: one for all walls, or one for each. Only its component along the wall counts. It
         must be given with two coefficients, and only then.
+    rule : str, optional
+        Rule that combines the frictions of two bodies, or of a body and a wall with a friction: ``"minimum"``,
+        ``"average"``, ``"geometric_mean"``, ``"product"`` or ``"maximum"``. At a wall without a friction the body's own
+        acts.
+    pairs : dict or sequence, optional
+        Exceptions to the rule: ``{("die", "tray"): 0.2}``, or a sequence of ``("die", "tray", 0.2)``. An end of a pair
+        is the name of a body or wall, the index of a body, or -1 - k for wall k. The order of both ends does not count.
     """
 
     coefficient: float | tuple[float, float] = 0.5
     axis: Vector | tuple[Vector, ...] | None = None
+    rule: Rule = field(default=FRICTION_RULE, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    pairs: tuple[Pair, ...] = field(default=(), kw_only=True, metadata=SHOWN_IF_GIVEN)
 
     if TYPE_CHECKING:
 
-        def __init__(self, coefficient: ArrayLike = 0.5, axis: ArrayLike | None = None) -> None: ...
+        def __init__(
+            self,
+            coefficient: ArrayLike = 0.5,
+            axis: ArrayLike | None = None,
+            *,
+            rule: Rule = "geometric_mean",
+            pairs: Mapping[tuple[End, End], float] | Iterable[Sequence[End | float]] = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         name, given = "Friction.coefficient", self.coefficient
@@ -144,6 +187,9 @@ class Friction(Effect):
             raise ValueError(f"Friction.axis is {shown(self.axis)}; allowed is {allowed}")
         if not is_even:
             object.__setattr__(self, "axis", _axes(self.axis))
+        checked_rule(self.rule, "Friction.rule")
+        pairs = checked_pairs(self.pairs, "Friction.pairs", validation.non_negative)
+        object.__setattr__(self, "pairs", pairs)
 
     __repr__ = fields_repr
     _repr_html_ = fields_table

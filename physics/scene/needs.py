@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from physics.kernels.contact_law.materials import WALL_COLUMNS
 from physics.kernels.state.contact_law_dispatch import (
     LAW_ANISOTROPY,
     LAW_DAMPING,
@@ -20,6 +21,7 @@ from physics.kernels.state.layout import VERTEX_COUNT
 from physics.mass.inertia import principal_axes
 from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot, field_slots
+from physics.scene.materials import find_materials, has_restitution
 from physics.scene.scene import Scene
 
 # Moments of inertia that differ by less than this share are equal to rounding; their gyroscopic torque would be noise.
@@ -40,6 +42,13 @@ class Needs:
         Whether bodies can touch each other.
     rubbing : bool
         Whether friction can act.
+    rebounding : bool
+        Whether contacts may rebound by Newton's law.
+    material_columns : int
+        Numbers of a body for its coefficients at walls; 0 if no wall has one of its own, and no exception names a wall.
+    walls_differ, pair_materials : bool
+        Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
+        default rules (`physics.scene.materials`).
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -66,6 +75,10 @@ class Needs:
     touching: bool
     meeting: bool
     rubbing: bool
+    rebounding: bool
+    material_columns: int
+    walls_differ: bool
+    pair_materials: bool
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -106,10 +119,14 @@ def find_needs(scene: Scene) -> Needs:
     axes = [principal_axes(body.inertia) for body in scene.bodies]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
-    fields = field_slots(scene.effects, len(scene.bodies))
+    fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
     return Needs(
         contact, friction, gravity, touching, meeting,
         rubbing=touching and friction is not None,
+        rebounding=touching and has_restitution(scene),
+        material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
+        walls_differ=touching and materials.differ_at_walls,
+        pair_materials=meeting and materials.act_between_bodies,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -15,10 +15,11 @@ from physics import validation
 from physics.annotations import Effect, Vector
 from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
-from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
-from physics.summary import SCREEN, counted, parts_repr, shown
+from physics.scene.materials import check_materials
+from physics.summary import SCREEN, SHOWN_IF_GIVEN, counted, fields_repr, parts_repr, shown
 
 # An axis of friction and the normal of a wall count as parallel if the sine of the angle between them is below this.
 # Of the sixteen digits of a direction ten are then left for its component along the wall.
@@ -51,15 +52,32 @@ class HalfSpace:
         Normal out of the wall, towards the bodies, world frame; any vector but zero, it is normalised.
     offset : float
         Distance of the plane from the origin along the unit normal [m].
+    name : str, optional
+        Name of the wall; no other wall or body of a scene may have it. It changes no motion.
+    friction, restitution : float, optional
+        Coefficients μ, at least 0, and e, from 0 to 1. `Friction.rule` and `Contact.restitution_rule` combine them with
+        those of a body. None: the body's own act.
     """
 
     normal: Vector
     offset: float = 0.0
+    name: str | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    friction: float | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    restitution: float | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
 
     if TYPE_CHECKING:
 
-        def __init__(self, normal: ArrayLike, offset: float = 0.0) -> None: ...
+        def __init__(
+            self,
+            normal: ArrayLike,
+            offset: float = 0.0,
+            *,
+            name: str | None = None,
+            friction: float | None = None,
+            restitution: float | None = None,
+        ) -> None: ...
 
+    __repr__ = fields_repr
     _repr_html_ = fields_table
 
     def __post_init__(self) -> None:
@@ -69,6 +87,9 @@ class HalfSpace:
             raise ValueError(f"HalfSpace.normal is {shown(self.normal)}; allowed is any vector but zero")
         object.__setattr__(self, "normal", tuple(validation.unit(normal, length).tolist()))
         object.__setattr__(self, "offset", validation.number(self.offset, "HalfSpace.offset"))
+        if self.name is not None:
+            check_name(self.name, "HalfSpace.name")
+        check_coefficients(self, "HalfSpace.")
 
 
 @known_keywords
@@ -144,6 +165,7 @@ class Scene:
             )
         self._check_axes()
         self._check_fields()
+        check_materials(self)
         if self.walls and contact is None:
             warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
 
@@ -173,13 +195,12 @@ class Scene:
         )  # fmt: skip
 
     def _check_names(self) -> None:
-        first: dict[str, int] = {}
-        for b, body in enumerate(self.bodies):
-            if body.name is not None and first.setdefault(body.name, b) != b:
-                raise ValueError(
-                    f"Scene.bodies[{b}] has the name {shown(body.name)}, as Scene.bodies[{first[body.name]}]; allowed "
-                    "are different names"
-                )
+        named = [(f"Scene.bodies[{b}]", body.name) for b, body in enumerate(self.bodies)]
+        named += [(f"Scene.walls[{k}]", wall.name) for k, wall in enumerate(self.walls)]
+        first: dict[str, str] = {}
+        for place, name in named:
+            if name is not None and first.setdefault(name, place) != place:
+                raise ValueError(f"{place} has the name {shown(name)}, as {first[name]}; allowed are different names")
 
     def _check_axes(self) -> None:
         friction = self.effect(Friction)
@@ -199,16 +220,16 @@ class Scene:
 
     def _check_fields(self) -> None:
         fields = [effect for effect in self.effects if isinstance(effect, Field)]
-        for field in fields:
-            field.check(len(self.bodies))
+        for each in fields:
+            each.check(len(self.bodies))
         for b, body in enumerate(self.bodies):
-            unknown = [type(field).__name__ for field in fields if field.needs_axes and body.kind == "hull"]
+            unknown = [type(each).__name__ for each in fields if each.needs_axes and body.kind == "hull"]
             if unknown:
                 raise ValueError(
                     f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a hull; allowed with it are "
                     "blocks, spheres and ellipsoids: it depends on what their surface is like"
                 )
-        if fields and all(field.is_air for field in fields):
+        if fields and all(each.is_air for each in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
 
     def effect(self, kind: type[EffectType]) -> EffectType | None:

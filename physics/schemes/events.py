@@ -13,6 +13,7 @@ from physics.kernels.time_stepping.workspace import make_workspace
 from physics.scene.needs import Needs
 from physics.scene.scene import Scene
 from physics.schemes import objections
+from physics.schemes.material_tables import wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 from physics.schemes.wall_memory import WallMemory
 
@@ -37,7 +38,8 @@ class EventDriven(Scheme):
         )
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
-        return make_workspace(walls, switches.features, switches.terms, switches.laws, **settings(accuracy))
+        materials = wall_materials(scene, switches)
+        return make_workspace(walls, switches.features, switches.terms, switches.laws, materials, **settings(accuracy))
 
     def make_motion(self, scene: Scene, switches: Switches, accuracy: Accuracy) -> Any:
         return make_motion(len(scene.walls), switches.features, accuracy.collisions == "sequential")

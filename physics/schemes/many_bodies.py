@@ -17,6 +17,7 @@ from physics.scene.polyhedra import polyhedra
 from physics.scene.scene import Scene
 from physics.schemes import objections
 from physics.schemes.body_memory import BodyMemory
+from physics.schemes.material_tables import pair_materials, wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
 
@@ -54,6 +55,7 @@ class ManyBodies(Scheme):
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)
         return allocation.make_bodies_workspace(
             bodies, walls, switches.terms, polyhedra(scene.bodies), meet=switches.meeting,
+            wall_materials=wall_materials(scene, switches, True), pair_materials=pair_materials(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

@@ -75,6 +75,12 @@ class Switches:
         Force fields of the scene.
     laws : tuple of str
         Contact laws at walls, names from `physics.kernels.state.contact_law_dispatch.LAWS`.
+    material_columns : int
+        Columns of `params` for coefficients at walls; 0 if no wall has one of its own, and no exception names a wall.
+    walls_differ : True or None
+        Whether a body may have different coefficients at two walls.
+    pair_materials : True or None
+        Whether two bodies in contact have other coefficients than those of the default rules.
     """
 
     contact: bool | None
@@ -92,6 +98,19 @@ class Switches:
     features: int
     fields: tuple[FieldSlot, ...]
     laws: tuple[str, ...]
+    material_columns: int
+    walls_differ: bool | None
+    pair_materials: bool | None
+
+    @property
+    def field_columns(self) -> int:
+        """Number of columns of the force fields in the parameter table."""
+        return sum(term.count * term.size for term in self.terms)
+
+    @property
+    def columns(self) -> int:
+        """Number of columns of the parameter table behind those of all bodies: fields, coefficients at walls, laws."""
+        return self.field_columns + self.material_columns + len(self.laws)
 
     @property
     def terms(self) -> tuple[Term, ...]:

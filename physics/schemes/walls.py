@@ -12,6 +12,7 @@ from physics.kernels.time_stepping.workspace import make_workspace
 from physics.scene.needs import Needs
 from physics.scene.scene import Scene
 from physics.schemes import objections
+from physics.schemes.material_tables import wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 from physics.schemes.wall_memory import WallMemory
 
@@ -30,7 +31,8 @@ class BodiesAtWalls(Scheme):
         return objections.to_turns(needs, accuracy) or objections.to_tangential(scene, needs)
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
-        return make_workspace(walls, switches.features, switches.terms, switches.laws, **settings(accuracy))
+        materials = wall_materials(scene, switches)
+        return make_workspace(walls, switches.features, switches.terms, switches.laws, materials, **settings(accuracy))
 
     def arguments(self, worlds: Worlds, k: int) -> tuple:
         plan = worlds.plan

@@ -9,15 +9,15 @@ import numpy as np
 from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.state import layout as at
 from physics.plan.plan import Plan
-from physics.scene.effects import Contact, Friction, Gravity
+from physics.scene.effects import Gravity
 from physics.scene.force_field import write_columns
-from physics.world import parameters
+from physics.world import materials, parameters
 from physics.world.batch import Batch
 
 
 def check_room(worlds: int, bodies: int, plan: Plan) -> None:
     """Raise a ValueError for more worlds than this machine's memory holds, before the system ends the process."""
-    row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.field_columns)  # the least that a body takes [bytes]
+    row = 8 * (at.STATE_SIZE + at.PARAM_SIZE + plan.columns)  # the least that a body takes [bytes]
     memory = machine_memory()
     if worlds * bodies * row > memory:
         raise ValueError(
@@ -37,7 +37,7 @@ def machine_memory() -> int:
 def fill(world: Batch) -> None:
     """Write the scene's bodies and effects into the state and parameter arrays of all worlds of a batch."""
     scene, plan = world.scene, world.plan
-    contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
+    gravity = scene.effect(Gravity)
     state = world.state.reshape(world.worlds, world.body_count, at.STATE_SIZE)
     for b, body in enumerate(scene.bodies):
         state[:, b, at.POS : at.POS + 3] = body.pos
@@ -45,8 +45,7 @@ def fill(world: Batch) -> None:
         state[:, b, at.LINVEL : at.LINVEL + 3] = body.linvel
         state[:, b, at.ANGVEL : at.ANGVEL + 3] = body.angvel
     parameters.write_bodies(world.params, scene.bodies)
-    world.params[:, at.FRICTION] = friction.along if friction else 0.0
-    world.params[:, at.RESTITUTION] = (contact.restitution or 0.0) if contact else 0.0
+    materials.write_materials(world.params, scene, plan)
     world.gravity[:] = gravity.acceleration if gravity else 0.0
     parameters.write_laws(world.params, plan.laws, scene.effects)
     columns = world.params[:, at.PARAM_SIZE :]

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 from zlib import crc32
 
 from physics.scene.effects import Actuator, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
-from physics.scene.scene import Scene
+from physics.scene.materials import find_materials
+from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE
+from physics.scene.scene import HalfSpace, Scene
 
 NUMBERS_IN_PLAN = (Actuator, Sleeping)
 """Effects whose numbers are the same for all worlds, since the plan holds them and not the arrays of a world."""
@@ -21,7 +24,7 @@ def scene_settings(scene: Scene) -> dict[str, str]:
     """
     return {
         "bodies": ", ".join(map(_body, scene.bodies)),
-        "walls": ", ".join(map(repr, scene.walls)),
+        "walls": ", ".join(map(_wall, scene.walls)) + "; they differ" * find_materials(scene).differ_at_walls,
         "effects": ", ".join(sorted(map(_effect, scene.effects))),
     }
 
@@ -42,18 +45,32 @@ def _body(body) -> str:
     return f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
 
 
+def _wall(wall: HalfSpace) -> str:
+    """Text for a wall: its plane, and which coefficients it has, without their numbers, which each world has."""
+    plane = repr(replace(wall, name=None, friction=None, restitution=None))
+    own = [name for name in ("friction", "restitution") if getattr(wall, name) is not None]
+    return " with ".join([plane, *own])
+
+
 def _effect(effect) -> str:
     """Text for an effect: its name, and its settings that are the same in all worlds."""
     if isinstance(effect, NUMBERS_IN_PLAN):
         return repr(effect)
     if isinstance(effect, Contact):
         return " with ".join(["Contact", *_switches(effect)])
-    if isinstance(effect, Friction) and effect.axis is not None:
-        return f"Friction(axis={effect.axis})"
+    if isinstance(effect, Friction):
+        named = _settings(effect, {"axis": None, "rule": FRICTION_RULE, "pairs": ()})
+        return f"Friction({', '.join(named)})" if named else "Friction"
     return effect.kind.__name__.lstrip("_") if isinstance(effect, Field) else type(effect).__name__
 
 
 def _switches(contact: Contact) -> list[str]:
     """Names of the declared parts of a `Contact`, without their numbers, such as ``restitution``."""
     named = [name for name in ("restitution", "tangential", "stiffness") if getattr(contact, name) is not None]
-    return named + ["walls alone"] * (not contact.between_bodies)
+    named += ["walls alone"] * (not contact.between_bodies)
+    return named + _settings(contact, {"restitution_rule": RESTITUTION_RULE, "restitution_pairs": ()})
+
+
+def _settings(effect, usual: Mapping[str, Any]) -> list[str]:
+    """Texts ``name=value`` for the fields of an effect whose values are not the `usual` ones."""
+    return [f"{name}={getattr(effect, name)!r}" for name in usual if getattr(effect, name) != usual[name]]

@@ -15,7 +15,7 @@ from physics.scene.body_names import body_label
 from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.summary import shown
-from physics.world import choice, parameters
+from physics.world import choice, materials, parameters
 from physics.world.batch import Batch
 from physics.world.wall_distance import geometric_centres, wall_gaps
 
@@ -27,6 +27,11 @@ SOFT_DEPTH = 1.0
 
 # The centres of two bodies count as equal within this share of the smaller bounding radius, which allows for rounding.
 SAME_PLACE = 1e-12
+
+# Names of the arguments of `World.set_parameters` that are numbers of bodies, walls and effects.
+PARAMETERS = (
+    "mass", "size", "inertia_body", "friction", "restitution", "wall_friction", "wall_restitution", "effects",
+)  # fmt: skip
 
 # Direction along which bodies are sorted to find equal centres; scenes hardly ever use it.
 SKEW = np.array([0.5257311121191336, 0.3090169943749474, 0.7925309171246312])
@@ -42,13 +47,15 @@ def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
         world.actuation.forget(chosen)
 
 
-def set_parameters(world: Batch, mass, size, inertia_body, friction, restitution, gravity, effects, worlds) -> None:
-    """Set physical parameters of some worlds; `World.set_parameters` documents arguments and errors."""
+def set_parameters(world: Batch, given: Mapping, worlds) -> None:
+    """Set physical parameters of some worlds, `given` by name; `World.set_parameters` documents them and all errors."""
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
-    params = _new_parameters(world, chosen, rows, mass, size, inertia_body, friction, restitution, effects)
+    given = dict(given)
+    gravity = given.pop("gravity")
+    params = _new_parameters(world, chosen, rows, given)
     field = None if gravity is None else _new_gravity(world, chosen, gravity)
-    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=size is None)
+    _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=given["size"] is None)
     if field is not None:
         world.gravity[chosen] = field
 
@@ -78,8 +85,7 @@ def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str =
     new = _new_state(world, chosen, rows, **{**dict.fromkeys(("pos", "quat", "linvel", "angvel")), **state})
     params = world.params[rows]
     if given:
-        names = ("mass", "size", "inertia_body", "friction", "restitution", "effects")
-        params = _new_parameters(world, chosen, rows, **{**dict.fromkeys(names), **given})
+        params = _new_parameters(world, chosen, rows, {**dict.fromkeys(PARAMETERS), **given})
     field = None if gravity is None else _new_gravity(world, chosen, gravity)
     _adopt(world, chosen, rows, new, params, what)
     if field is not None:
@@ -103,10 +109,13 @@ def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndar
     return state
 
 
-def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, friction, restitution, effects) -> np.ndarray:
-    """Make the new rows of `params` for the chosen worlds: arguments that are not None replace the old columns."""
+def _new_parameters(world: Batch, chosen, rows, given: Mapping) -> np.ndarray:
+    """Make the new rows of `params` for the chosen worlds: parameters `given` that are not None replace old columns."""
     params = world.params[rows]
     plan, shape = world.plan, (len(chosen), world.body_count)
+    mass, size, inertia_body, friction, restitution, wall_friction, wall_restitution, effects = (
+        given[name] for name in PARAMETERS
+    )
     if mass is not None or size is not None or inertia_body is not None:
         parameters.change_inertia(params, world.scene.bodies, plan, mass, size, inertia_body, shape)
     if friction is not None:
@@ -115,6 +124,7 @@ def _new_parameters(world: Batch, chosen, rows, mass, size, inertia_body, fricti
     if restitution is not None:
         _needs("restitution", plan.restitution, "physics.Contact(restitution=...)")
         params[:, at.RESTITUTION] = validation.share(*parameters.spread(restitution, shape, "restitution")).ravel()
+    materials.write_wall_coefficients(params, shape, plan, wall_friction, wall_restitution)
     if effects is not None:
         _write_effects(world, chosen, params, effects)
     return params
@@ -131,8 +141,8 @@ def _write_effects(world: Batch, chosen, params, effects) -> None:
             raise ValueError(f"effects holds several {type(effect).__name__}; allowed is one")
         _needs(type(effect).__name__, world.scene.effect(type(effect)), f"physics.{type(effect).__name__}(...)")
         if isinstance(effect, Friction):
-            _check_axis(effect, world.scene.effect(Friction))
-            params[:, at.FRICTION] = effect.along
+            _check_settings(effect, world.scene.effect(Friction))
+            materials.write_scene_friction(params, world.scene, effect)
     parameters.write_laws(params, world.plan.laws, laws)
     fields = [effect for effect in effects if effect not in laws]
     write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
@@ -240,11 +250,14 @@ def _needs(field: str, is_on, effect: str) -> None:
         raise ValueError(f"{field} was given, but the scene does not declare it; add {effect} to Scene.effects")
 
 
-def _check_axis(friction: Friction, declared: Friction) -> None:
-    if friction.axis != declared.axis:
-        raise ValueError(
-            f"Friction.axis is {friction.axis}; allowed is the scene's, {declared.axis}: it is the same in all worlds"
-        )
+def _check_settings(friction: Friction, declared: Friction) -> None:
+    """Refuse a `Friction` whose settings that are the same in all worlds are not the scene's."""
+    for name in ("axis", "rule", "pairs"):
+        given, own = getattr(friction, name), getattr(declared, name)
+        if given != own:
+            raise ValueError(
+                f"Friction.{name} is {shown(given)}; allowed is the scene's, {shown(own)}: it is the same in all worlds"
+            )
 
 
 def _changed_slots(world: Batch, effects) -> list[FieldSlot]:

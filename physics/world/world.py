@@ -104,7 +104,7 @@ class World(Touching):
     def _allocate(self) -> None:
         rows = self.worlds * self.body_count
         self.state = np.zeros((rows, at.STATE_SIZE))
-        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.field_columns + len(self.plan.laws)))
+        self.params = np.zeros((rows, at.PARAM_SIZE + self.plan.columns))
         self.gravity = np.zeros((self.worlds, 3))
         friction = self.scene.effect(Friction)
         along = friction.directions(len(self.scene.walls)) if friction else None
@@ -296,6 +296,8 @@ class World(Touching):
         inertia_body: ArrayLike | None = None,
         friction: ArrayLike | None = None,
         restitution: ArrayLike | None = None,
+        wall_friction: ArrayLike | None = None,
+        wall_restitution: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
         effects: Sequence[Field | Friction | RollingFriction | SpinFriction] | None = None,
         worlds: ArrayLike | None = None,
@@ -307,8 +309,12 @@ class World(Touching):
         mass, friction, restitution : (), (k,) or (k, bodies) array_like, optional
             Masses [kg] and coefficients of the bodies of k worlds. A single axis of length k has a number for each
             world; one of another length must be (bodies,), for all worlds alike. With a `Friction` of two coefficients
-            `friction` is the first, and the second changes by the same factor. Two bodies that touch have the geometric
-            mean of their frictions and the larger restitution; at a wall the body's own coefficients act.
+            `friction` is the first, and the second changes by the same factor. Coefficients of bodies and walls that
+            touch are combined by the rules of `Friction` and `Contact`.
+        wall_friction, wall_restitution : (), (k,) or (k, walls) array_like, optional
+            Coefficients of the walls of k worlds, as for bodies; nan: a wall has none of its own, and the body's acts.
+            The scene must have a `HalfSpace` with such a coefficient. If all its walls have equal ones, they must be
+            equal in each world, too.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere [m]. The size
             of a hull cannot change: only twice its `dimensions` is accepted. Position and velocity stay, and so does
@@ -331,7 +337,8 @@ class World(Touching):
             A value out of range, an effect that the scene does not declare, or a new size that reaches deep
             into a wall. Nothing has changed then.
         """
-        setters.set_parameters(self, mass, size, inertia_body, friction, restitution, gravity, effects, worlds)
+        numbers = (mass, size, inertia_body, friction, restitution, wall_friction, wall_restitution, effects)
+        setters.set_parameters(self, {**dict(zip(setters.PARAMETERS, numbers)), "gravity": gravity}, worlds)
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 

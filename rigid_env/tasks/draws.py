@@ -8,11 +8,13 @@ from difflib import get_close_matches
 
 import numpy as np
 
+from physics.keywords import nearest_first
+from physics.scene.scene import Scene
 from physics.summary import shown
 from physics.world.world import World
 from rigid_env.tasks.distribution import Distribution, is_of_user
 from rigid_env.tasks.distributions import is_elementwise
-from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS
+from rigid_env.tasks.parameters import CHECKS, DRAWN_LENGTHS, WALL_PARAMETERS
 
 SEED = 0
 """Seed of the uniform numbers for values before the first episode; any fixed number serves."""
@@ -23,17 +25,40 @@ NEAR = 0.8
 DOWN = (0.0, -1.0, 0.0)
 """Direction of gravity in a world whose gravity is zero."""
 
-_PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[(\d+)\])?$")
+_PARAMETER = re.compile(rf"({'|'.join(DRAWN_LENGTHS)})(?:\[([^]]+)\])?$")
 
 
-def parameter_of(name: str) -> tuple[str, int | None] | None:
-    """Split a draw's name such as ``mass[1]`` into a physical parameter and a body.
+def parameter_of(name: str) -> tuple[str, str | None] | None:
+    """Split a draw's name such as ``mass[1]`` or ``friction[die]`` into a physical parameter and a body or wall.
 
-    Returns ``("mass", 1)``, with None for the body if the name means all bodies, and None alone for a name that is no
+    Returns ``("mass", "1")``, with None for the body if the name means all bodies, and None alone for a name that is no
     physical parameter.
     """
     found = _PARAMETER.match(name)
-    return None if found is None else (found[1], None if found[2] is None else int(found[2]))
+    return None if found is None else (found[1], found[2])
+
+
+def place_of(name: str, scene: Scene) -> int | None:
+    """Index of the body or wall that the name of a physical parameter means; None: all of them.
+
+    It is given by its index or its name.
+
+    Raises
+    ------
+    ValueError
+        The scene has no such body or wall.
+    """
+    kind, part = parameter_of(name) or ("", None)
+    if part is None:
+        return None
+    what, items = ("walls", scene.walls) if kind in WALL_PARAMETERS else ("bodies", scene.bodies)
+    names = {item.name: k for k, item in enumerate(items) if item.name is not None}
+    if part in names:
+        return names[part]
+    if part.isdecimal() and int(part) < len(items):
+        return int(part)
+    known = "".join(f"{each}, " for each in nearest_first(part, names))
+    raise ValueError(f"{part!r} in {name!r} is none of the {what}; allowed are {known}and 0 to {len(items) - 1}")
 
 
 class Draws:
@@ -43,7 +68,8 @@ class Draws:
     ----------
     distributions : mapping of str to Distribution
         Distribution of each value. The names ``mass``, ``size``, ``radius`` (of spheres), ``friction``, ``restitution``
-        and ``gravity`` mean physical parameters of all bodies, ``mass[1]`` that of body 1 alone.
+        and ``gravity`` mean physical parameters of all bodies, ``mass[1]`` that of body 1 alone, ``mass[die]`` that of
+        the body of this name. ``wall_friction`` and ``wall_restitution`` are those of the walls, in the same way.
     worlds : int
         Number of worlds.
 
@@ -167,7 +193,9 @@ class Draws:
         return values
 
 
-def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def world_arguments(
+    values: Mapping[str, np.ndarray], before: Mapping[str, np.ndarray], scene: Scene
+) -> dict[str, np.ndarray]:
     """Arguments of `World.set_parameters` from values of physical parameters.
 
     Parameters
@@ -175,7 +203,9 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
     values : mapping of str to (n,) or (n, k) array
         New values in n worlds, by names such as ``mass`` and ``mass[1]``.
     before : mapping of str to (n, bodies) or (n, bodies, 3) array
-        Present values of all bodies, by parameter; gravity (n, 3) as a vector [m/s²].
+        Present values of all bodies, or walls, by parameter; gravity (n, 3) as a vector [m/s²].
+    scene : Scene
+        Scene of the worlds, which has the names of bodies and walls.
 
     Returns
     -------
@@ -184,7 +214,7 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
     """
     arguments: dict[str, np.ndarray] = {}
     for name, value in values.items():
-        parameter, body = parameter_of(name)
+        (parameter, _), place = parameter_of(name), place_of(name, scene)
         if parameter == "gravity":
             strength = np.linalg.norm(before["gravity"], axis=1, keepdims=True)
             is_on = strength > 0.0
@@ -194,10 +224,10 @@ def world_arguments(values: Mapping[str, np.ndarray], before: Mapping[str, np.nd
         if parameter == "radius":  # three equal diameters
             parameter, value = "size", np.repeat(2.0 * value[:, None], 3, axis=1)
         table = arguments.setdefault(parameter, before[parameter].copy())
-        if body is None:
+        if place is None:
             table[...] = value[:, None]
         else:
-            table[:, body] = value
+            table[:, place] = value
     return arguments
 
 
@@ -222,7 +252,13 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
         "friction": (world.plan.friction, "physics.Friction(...)"),
         "restitution": (world.plan.restitution, "physics.Contact(restitution=...)"),
         "gravity": (world.plan.gravity, "physics.Gravity(...)"),
+        "wall_friction": (world.plan.material_columns, "a friction of its own, physics.HalfSpace(..., friction=...),"),
+        "wall_restitution": (
+            world.plan.material_columns and world.plan.restitution,
+            "a restitution of its own, physics.HalfSpace(..., restitution=...),",
+        ),
     }
+    meant: dict[tuple[str, int], str] = {}
     for name, distribution in distributions.items():
         parameter = parameter_of(name)
         if parameter is None:
@@ -234,12 +270,18 @@ def check_draws(task: str, distributions: Mapping[str, Distribution], world: Wor
         is_on, effect = needs.get(kind, (True, ""))
         if not is_on:
             raise ValueError(
-                f"draws of {task} has {name!r}, but its scene does not declare it; add {effect} to its effects"
+                f"draws of {task} has {name!r}, but its scene does not declare it; add {effect} to its "
+                f"{'walls' if kind in WALL_PARAMETERS else 'effects'}"
             )
         if body is not None:
-            if kind == "gravity" or body >= world.body_count:
-                bodies = f"bodies 0 to {world.body_count - 1}, and gravity is of all"
-                raise ValueError(f"draws of {task} has {name!r}; allowed are {bodies}")
+            if kind == "gravity":
+                raise ValueError(f"draws of {task} has {name!r}; allowed is 'gravity', which is of all bodies")
+            try:
+                key = kind, place_of(name, world.scene) or 0
+            except ValueError as error:
+                raise ValueError(f"draws of {task}: {error}") from None
+            if meant.setdefault(key, name) != name:
+                raise ValueError(f"draws of {task} has {meant[key]!r} and {name!r}; allowed is one of the two")
             if kind in distributions:
                 raise ValueError(f"draws of {task} has {kind!r} and {name!r}; allowed is one of the two")
         if kind in ("size", "radius"):
@@ -254,9 +296,9 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
     A ValueError refuses a radius for a body that is no sphere, a radius beside a size for the same body, and a size
     with three independent numbers for a sphere.
     """
-    kind, body = parameter_of(name) or ("", None)
-    bodies = world.scene.bodies
-    meant = range(len(bodies)) if body is None else (body,)
+    kind = (parameter_of(name) or ("",))[0]
+    bodies, place = world.scene.bodies, place_of(name, world.scene)
+    meant = range(len(bodies)) if place is None else (place,)
     for index in meant:
         is_sphere = bodies[index].kind == "sphere"
         if kind == "radius" and not is_sphere:

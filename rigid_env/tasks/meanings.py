@@ -6,6 +6,7 @@ import inspect
 import re
 
 from rigid_env.tasks.draws import parameter_of
+from rigid_env.tasks.parameters import WALL_PARAMETERS
 
 ARGUMENTS = {
     "accuracy": "preset of the engine, a `physics.Accuracy`, or a dict of its settings",
@@ -39,6 +40,8 @@ PARAMETERS = {
     "friction": "Coulomb coefficient",
     "restitution": "restitution",
     "gravity": "strength of gravity [m/s²]",
+    "wall_friction": "Coulomb coefficient of walls",
+    "wall_restitution": "restitution of walls",
 }
 """Explanations of draws that are physical parameters, by name."""
 
@@ -48,8 +51,12 @@ def draw_meaning(name: str) -> str:
     found = parameter_of(name)
     if found is None:
         return "the task's own"
-    parameter, body = found
-    return PARAMETERS[parameter] + ("" if body is None else f" of body {body}")
+    parameter, part = found
+    if part is None:
+        return PARAMETERS[parameter]
+    if parameter in WALL_PARAMETERS:
+        return PARAMETERS[parameter].replace("of walls", f"of wall {part}")
+    return f"{PARAMETERS[parameter]} of body {part}"
 
 
 def argument_meaning(kind: type, name: str) -> str:

@@ -25,13 +25,18 @@ CHECKS = {
     "restitution": validation.share,
     "gravity": validation.positive,
     "radius": validation.positive,
+    "wall_friction": validation.non_negative,
+    "wall_restitution": validation.share,
 }
 """Function for each parameter that checks whether values are in the allowed range."""
 
 LENGTHS = {"mass": 1, "size": 3, "friction": 1, "restitution": 1, "gravity": 1}
 """Length of a value of each parameter, in the order in which the block's tasks draw the parameters."""
 
-DRAWN_LENGTHS = {**LENGTHS, "radius": 1}
+WALL_PARAMETERS = ("wall_friction", "wall_restitution")
+"""Parameters of walls; all others are of bodies, or of the world."""
+
+DRAWN_LENGTHS = {**LENGTHS, "radius": 1, **dict.fromkeys(WALL_PARAMETERS, 1)}
 """Length of a value of each parameter that a task may draw: one for the radius of a sphere, three for a size."""
 
 OFF_MIDDLE = (0.25, 0.4, 0.75)

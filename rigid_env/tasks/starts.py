@@ -17,6 +17,7 @@ from physics.kernels.state import layout as at
 from physics.parallel.team import listed
 from physics.undo import undo_on_error
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
+from physics.world.materials import wall_coefficients
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.distribution import Distribution, is_of_user
@@ -163,10 +164,13 @@ class Starts(Declaration):
 
     def _arguments(self, rows: np.ndarray, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Arguments of `World.set_parameters` for worlds `rows`, from physical parameters by name."""
-        return world_arguments(values, self._parameters_of(rows)) if values else {}
+        return world_arguments(values, self._parameters_of(rows), self.world.scene) if values else {}
 
     def _parameters_of(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Present physical parameters of worlds `rows` by name: (n, bodies) or (n, bodies, 3), gravity (n, 3)."""
+        """Present physical parameters of worlds `rows` by name: (n, bodies) or (n, bodies, 3), gravity (n, 3).
+
+        Those of walls are (n, walls); a scene whose walls have no coefficients has none of these.
+        """
         world = self.world
         params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
         return {
@@ -175,6 +179,7 @@ class Starts(Declaration):
             "friction": params[..., at.FRICTION],
             "restitution": params[..., at.RESTITUTION],
             "gravity": world.gravity[rows],
+            **{f"wall_{name}": table for name, table in wall_coefficients(params[:, 0], world.plan).items()},
         }
 
     def _unlike_scene(self) -> set[str]:
@@ -187,7 +192,7 @@ class Starts(Declaration):
         found = set()
         for name, value in fixed.items():
             ((parameter, now),) = self._arguments(one, {name: value}).items()
-            if not np.allclose(now, self._parameters_of(one)[parameter], rtol=PARAMETER_ROUNDING, atol=0.0):
+            if not np.allclose(now, self._parameters_of(one)[parameter], PARAMETER_ROUNDING, 0.0, equal_nan=True):
                 found.add(name)
         return found
 

@@ -59,6 +59,19 @@ READ = {
     "condim": model(box('condim="1"'), world=floor('condim="1"')),
     "friction of none": model(box('friction="0"'), world=floor('friction="0"')),
     "friction of boxes": model(box('friction=".3"'), box('friction=".8"'), world=floor('friction=".8"')),
+    "two frictions": model(box('name="a"'), box('name="b" friction="2"'), world=floor('name="f"')),
+    "frictions": model(
+        box('friction=".3"'),
+        box('friction=".8" priority="1"'),
+        box('condim="1" friction=".1"'),
+        world=floor('friction=".2"') + floor('condim="1" friction=".05" pos="0 0 -9"'),
+    ),
+    "frictions of pairs": model(
+        *(box(f'name="{name}" friction="{mu}"') for name, mu in (("a", 0.2), ("b", 0.4), ("c", 0.6))),
+        world=floor('name="f" friction=".5"'),
+        after='<contact><pair geom1="a" geom2="b" condim="3" friction=".3 .3 0 0 0"/>'
+        '<pair geom1="c" geom2="f" condim="1"/></contact>',
+    ),
     "masks": model(box('contype="1" conaffinity="2"'), box('contype="2" conaffinity="1"')),
     "masks of walls": model(*[box('conaffinity="0"')] * 2, world=floor()),
     "pair": model(
@@ -186,10 +199,6 @@ REFUSED = {
     "some touch": (
         model(box('name="a"'), box('name="b" contype="0" conaffinity="0"'), world=floor('name="f"')),
         "line 6: <geom 'a'> touches <geom 'f'>, and <geom 'b'> passes through <geom 'f'>",
-    ),
-    "two frictions": (
-        model(box('name="a"'), box('name="b" friction="2"'), world=floor('name="f"')),
-        "friction is 1 between <geom 'a'> and <geom 'f'>, and 2 between",
     ),
     "spin friction": (model(box(), world=floor('name="f" condim="4"')), "<geom 'f'> has condim 4"),
     "bounce": (model(box('solref=".02 .1"'), world=floor()), "has solref 0.02 0.1, a soft contact"),

@@ -85,12 +85,12 @@ def test_the_rest_is_read_and_what_was_left_out_is_listed():
     )  # fmt: skip
     scene, left = read_mjcf(text, "here", drop=True)
     assert [body.pos for body in scene.bodies] == [(0, 0, 2), (2, 0, 2)]
-    assert scene.walls == (physics.HalfSpace((0, 0, 1)),)
-    assert scene.effect(physics.Friction).coefficient == 1.0  # of two pairs in three
+    assert scene.walls == (physics.HalfSpace((0, 0, 1), name="f", friction=0.5),)
+    assert [body.friction for body in scene.bodies] == [0.5, 1.0]
+    assert scene.effect(physics.Friction) == physics.Friction(1.0, rule="maximum")
     told = ["line 2: <option> has a medium", "line 6: <body> has 2 geoms", "line 4: <geom 't'> is a fixed sphere"]
     assert [message.startswith(start) for message, start in zip(left, told)] == [True] * 3
-    assert left[3].startswith("line 5: friction is 0.5 between <geom 'a'> and <geom 'f'>, and 1 between")
-    assert len(left) == 4
+    assert len(left) == 3
 
 
 def test_nothing_is_left_out_of_a_scene_that_is_read_whole(tmp_path):

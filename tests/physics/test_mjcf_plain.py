@@ -79,7 +79,7 @@ UNREAD = {
     "zaxis": ("<body> has zaxis=", MORE),
     "class": ("<default> in <mujoco> is not read", MORE),
     "priority": ("<geom> has priority='1'", MORE),
-    "pair": ("<contact> in <mujoco> is not read", MORE),
+    "pair": ("<pair> has no condim", MORE),
     "inertia from geom": ("<compiler> has inertiafromgeom='true'", MORE),
     "bound mass": ("<compiler> has boundmass='1'", MORE),
     "bound inertia": ("<compiler> has boundinertia='1'", MORE),

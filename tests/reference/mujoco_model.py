@@ -6,7 +6,7 @@ friction: bodies are put where they must touch, pair by pair. None of it goes th
 
 from __future__ import annotations
 
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 
 import mujoco
@@ -14,6 +14,7 @@ import numpy as np
 
 import physics
 from physics.rotations import rotation_matrices
+from tests.reference.materials import COMBINED
 
 FAR = 1e4  # from all planes and other bodies [m]
 MOST_BODIES = 6  # of which pairs are put in touch
@@ -169,19 +170,38 @@ def _of_walls(model, scene: physics.Scene) -> float:
 def _of_contact(model, scene: physics.Scene) -> float:
     """Largest difference of friction between what touches; infinite where MuJoCo and the scene touch differently."""
     bodies = free_bodies(model)[:MOST_BODIES]
-    contact, friction = scene.effect(physics.Contact), scene.effect(physics.Friction)
-    mu = friction.coefficient if friction else 0.0
-    worst = 0.0
-    for b, geom in product(bodies, _fixed_geoms(model)):
+    contact, wall, worst = scene.effect(physics.Contact), -1, 0.0
+    for geom in _fixed_geoms(model):
         is_plane = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-        # Planes that no body meets are no walls: `_of_walls`.
-        expected = {None} if not contact or not is_plane else {mu} if scene.walls else {None}
-        worst = max(worst, _friction_off(_met(model, b, geom), expected | ({None} if is_plane else set())))
-    for a, b in combinations(bodies, 2):
-        worst = max(
-            worst, _friction_off(_met_bodies(model, a, b), {mu if contact and contact.between_bodies else None})
-        )
+        found = [_met(model, b, geom) for b in bodies]
+        wall += is_plane and any(found)  # planes that no body meets are no walls: `_of_walls`
+        for b, mu in enumerate(found):
+            expected = (
+                {_friction(scene, b, -1 - wall)} if contact and is_plane and scene.walls and wall >= 0 else {None}
+            )
+            worst = max(worst, _friction_off(mu, expected | ({None} if is_plane else set())))
+    for (a, one), (b, other) in combinations(enumerate(bodies), 2):
+        expected = {_friction(scene, a, b) if contact and contact.between_bodies else None}
+        worst = max(worst, _friction_off(_met_bodies(model, one, other), expected))
     return worst
+
+
+def _friction(scene: physics.Scene, body: int, other: int) -> float:
+    """Coefficient of friction of a body and another one, or wall -1 - `other`, in a scene."""
+    friction = scene.effect(physics.Friction)
+    if friction is None:
+        return 0.0
+    for one, second, mu in friction.pairs:  # the reader names ends by their indices
+        if {one, second} == {body, other}:
+            return mu
+    own, theirs = (
+        item.friction for item in (scene.bodies[body], scene.bodies[other] if other >= 0 else scene.walls[-1 - other])
+    )
+    if own is None:
+        own = friction.coefficient
+    if theirs is None:
+        return own
+    return COMBINED[friction.rule](own, theirs)
 
 
 def _friction_off(found: set[float], expected: set[float | None]) -> float:

@@ -11,6 +11,7 @@ import pytest
 import physics
 from benchmarks.numpy_reach import NumpyReach
 from physics.kernels.state import layout as at
+from physics.world.materials import wall_coefficients
 from rigid_env.envs.checks import CheckError, check_task
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
@@ -147,6 +148,55 @@ def test_a_parameter_of_one_body_leaves_the_others():
     masses = task.weights / 9.81
     np.testing.assert_array_equal(masses[:, 0], 1.0)
     np.testing.assert_allclose(masses[:, 1], task.drawn["mass[1]"], rtol=1e-14)
+
+
+class Named(Task):
+    """Two balls over a floor: coefficients of one of them and of the floor, by their names."""
+
+    scene = physics.Scene(
+        [physics.Sphere(0.5, 1.0, pos=(3.0 * b, 0.5, 0), name=name) for b, name in enumerate(("die", "other"))],
+        [physics.HalfSpace((0, 1, 0), name="floor", friction=0.3), physics.HalfSpace((1, 0, 0), -9.0)],
+        [physics.Gravity(), physics.Contact(0.5), physics.Friction(0.5)],
+    )
+    actions = Wrench(1)
+    observation = (observe.pos(0), observe.pos(1))
+    draws = {"friction[die]": (0.2, 0.4), "wall_friction[floor]": (0.5, 0.9), "restitution[1]": (0.1, 0.2)}  # noqa: RUF012
+
+
+def test_coefficients_of_a_named_body_and_wall_are_drawn():
+    task = started(Named(3))
+    params = task.world.params.reshape(3, 2, -1)
+    np.testing.assert_array_equal(params[:, 0, at.FRICTION], task.drawn["friction[die]"])
+    np.testing.assert_array_equal(params[:, 1, at.FRICTION], 0.5)
+    np.testing.assert_array_equal(params[:, 1, at.RESTITUTION], task.drawn["restitution[1]"])
+    walls = wall_coefficients(params[:, 1], task.world.plan)["friction"]
+    np.testing.assert_array_equal(walls[:, 0], task.drawn["wall_friction[floor]"])
+    assert np.isnan(walls[:, 1]).all()
+    assert len(set(walls[:, 0])) == 3
+    task.hold("wall_friction[floor]", 0.7)
+    np.testing.assert_array_equal(walls[:, 0], 0.7)
+    text = TaskEnv(Named).describe()
+    assert "Coulomb coefficient of wall floor" in text
+    assert "Coulomb coefficient of body die" in text
+
+
+@pytest.mark.parametrize(
+    ("draws", "words"),
+    [
+        (
+            {"friction[dei]": 0.1},
+            r"draws of Wrong: 'dei' in 'friction\[dei\]' is none of the bodies; allowed are die, ",
+        ),
+        ({"mass[2]": 1.0}, r"'2' in 'mass\[2\]' is none of the bodies; allowed are die, other, and 0 to 1"),
+        ({"wall_friction[2]": 1.0}, r"'2' in 'wall_friction\[2\]' is none of the walls; allowed are floor, and 0"),
+        ({"friction[die]": 0.1, "friction[0]": 0.2}, r"has 'friction\[die\]' and 'friction\[0\]'; allowed is one"),
+        ({"wall_friction[floor]": (-1.0, 0.2)}, r"draws wall_friction\[floor\] of Wrong is \[-1. *, 0.2\]; allowed"),
+    ],
+)
+def test_wrong_names_of_bodies_and_walls_are_refused(draws, words):
+    kind = type("Wrong", (Named,), {"draws": draws})
+    with pytest.raises(ValueError, match=words):
+        kind(1)
 
 
 class Mixed(Free):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from physics.io.mjcf import forces
 from physics.io.mjcf.compiled_bodies import BodyElements, free_bodies
-from physics.io.mjcf.contacts import contact_effects, touched
+from physics.io.mjcf.contacts import FoundContact, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, compile_model
 from physics.io.mjcf.text import Element, ModelError
 from physics.io.mjcf.touching import Touching
+from physics.io.mjcf.writer import wall_name
 from physics.scene.scene import HalfSpace, Scene
 
 # MuJoCo keeps a plane as a rotation. If its normal agrees with that of the file to this share, the latter is used.
@@ -44,20 +46,26 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
         left.add(error)
     planes, contact = _contact(model, touching, free, left)
     fields = forces.damping(model, free, left)
-    effects = [*forces.gravity(model, free, left), *contact, *fields]
-    return Scene([each.body for each in free], [_wall(model, plane) for plane in planes], effects)
+    effects = [*forces.gravity(model, free, left), *contact.effects, *fields]
+    bodies = [replace(each.body, friction=mu) for each, mu in zip(free, contact.bodies)]
+    names = {body.name for body in bodies}
+    walls = [_wall(model, k, plane, mu, names) for k, (plane, mu) in enumerate(zip(planes, contact.planes))]
+    return Scene(bodies, walls, effects)
 
 
-def _contact(model: Model, touching: Touching, free: list[BodyElements], left: LeftOut) -> tuple[list[int], list]:
-    """Find the numbers of the plane geoms that are walls, and the effects `Contact` and `Friction`."""
+def _contact(
+    model: Model, touching: Touching, free: list[BodyElements], left: LeftOut
+) -> tuple[list[int], FoundContact]:
+    """Find the numbers of the plane geoms that are walls, and the contact of bodies with them and each other."""
     bodies = [touching.surface(each.geom) for each in free]
     met = _met_planes(model, touching, dict.fromkeys(bodies), left)
-    effects = contact_effects(bodies, [touching.surface(plane) for plane in met], left, touching.friction_of)
-    if not effects:
-        return [g for g in _fixed_geoms(model) if _kind(model, g) == "plane"], effects
+    found = find_contact(bodies, [touching.surface(plane) for plane in met], left, touching.friction_of)
+    if not found.effects:
+        planes = [g for g in _fixed_geoms(model) if _kind(model, g) == "plane"]
+        return planes, found._replace(planes=[None] * len(planes))
     for error in touching.faults([*met, *(each.geom for each in free)]):
         left.add(error)
-    return met, effects
+    return met, found
 
 
 def _kind(model: Model, geom: int) -> str:
@@ -85,8 +93,8 @@ def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -
     return met
 
 
-def _wall(model: Model, plane: int) -> HalfSpace:
-    """Make the wall of a plane geom; bodies are on its +z side."""
+def _wall(model: Model, k: int, plane: int, friction: float | None, taken: set) -> HalfSpace:
+    """Make wall number `k` of a plane geom; bodies are on its +z side. It gets no name that is `taken` by a body."""
     frame, spec = model.geom_frames[plane], model.spec("geom", plane)
     wall = HalfSpace(frame.R[:, 2])
     stated = np.array(spec.alt.zaxis) if spec is not None else np.full(3, np.nan)
@@ -94,4 +102,5 @@ def _wall(model: Model, plane: int) -> HalfSpace:
         given = HalfSpace(stated)
         if np.abs(np.subtract(given.normal, wall.normal)).max() <= ROTATED:
             wall = given
-    return HalfSpace(wall.normal, float(np.array(wall.normal) @ frame.pos))
+    name = wall_name(k, model.name("geom", plane), taken)
+    return HalfSpace(wall.normal, float(np.array(wall.normal) @ frame.pos), name=name, friction=friction)

@@ -1,7 +1,8 @@
 """Conversion of the contact properties of a MuJoCo model's geoms to the contact and friction of a scene.
 
-In MuJoCo bit masks and lists of pairs decide which geoms touch, and every pair has its own friction. A scene has one
-coefficient of friction; its bodies touch all walls or none, and all other bodies or none.
+In MuJoCo bit masks and lists of pairs decide which geoms touch. A pair has the larger friction of its geoms, unless a
+priority, a condim or the list decides otherwise; a scene has the rule "maximum" for that, and exceptions for pairs. Its
+bodies touch all walls or none, and all other bodies or none.
 """
 
 from __future__ import annotations
@@ -55,11 +56,10 @@ FrictionOf = Callable[[Surface, Surface], "float | None"]
 
 
 class _Met(NamedTuple):
-    """Group of `count` pairs of geoms with the surfaces `a` and `b`, and their friction; None: they do not touch."""
+    """Pair of surfaces and their friction; None: they do not touch."""
 
     a: Surface
     b: Surface
-    count: int
     friction: float | None
 
 
@@ -79,39 +79,67 @@ def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf
     return any(friction_of(surface, other) is not None for other in others)
 
 
-def contact_effects(
+class FoundContact(NamedTuple):
+    """Contact of a model in a scene's terms: its effects, and the frictions that bodies and walls have of their own."""
+
+    effects: list[Any]
+    bodies: list[float | None]
+    planes: list[float | None]
+
+
+def find_contact(
     bodies: Sequence[Surface],
     planes: Sequence[Surface],
     left: LeftOut,
     friction_of: FrictionOf = dynamic_friction,
-) -> list[Any]:
-    """Make the effects `Contact` and `Friction` of a scene; an empty list if nothing touches.
+) -> FoundContact:
+    """Find the effects `Contact` and `Friction` of a scene, none if nothing touches, and the frictions of its parts.
 
     Parameters
     ----------
     bodies, planes : sequence of Surface
         Surfaces of the bodies, and of the walls.
     left : LeftOut
-        Collects the differences between pairs. Where pairs differ in friction the coefficient of most pairs is taken;
-        where only some touch, all do.
+        Collects a message where only some pairs touch; in the scene all do.
     friction_of : callable
         Returns the friction coefficient of two surfaces, or None if they do not touch.
     """
     number = Counter(bodies)
-    at_planes = [_Met(a, b, n, friction_of(a, b)) for a, n in number.items() for b in dict.fromkeys(planes)]
+    at_planes = [_Met(a, b, friction_of(a, b)) for a in number for b in dict.fromkeys(planes)]
     between = [
-        _Met(a, b, pairs, friction_of(a, b))
-        for a, b in combinations_with_replacement(number, 2)
-        if (pairs := number[a] * (number[a] - 1) // 2 if a == b else number[a] * number[b])
+        _Met(a, b, friction_of(a, b)) for a, b in combinations_with_replacement(number, 2) if a != b or number[a] > 1
     ]
+    none = FoundContact([], [None] * len(bodies), [None] * len(planes))
     meet_planes = _agreed_contact(at_planes, left)
     meet_bodies = _agreed_contact(between, left)
     if not meet_planes and not meet_bodies:
-        return []
+        return none
     if len(bodies) == 1:  # there is no other body: decide as if there were a second one with the same masks
         meet_bodies = friction_of(bodies[0], bodies[0]) is not None
-    friction = _agreed_friction(at_planes + between, left)
-    return [Contact(between_bodies=meet_bodies)] + ([Friction(friction)] if friction > 0 else [])
+    contact = Contact(between_bodies=meet_bodies)
+    found = {pair.friction for pair in at_planes + between if pair.friction is not None}
+    if len(found) == 1:
+        friction = [Friction(mu) for mu in found if mu > 0]
+        return none._replace(effects=[contact, *friction])
+    own = [max(LEAST_FRICTION, surface.friction) for surface in (*bodies, *planes)]
+    effect = Friction(max(found), rule="maximum", pairs=_exceptions(bodies, planes, meet_bodies, friction_of))
+    return FoundContact([contact, effect], own[: len(bodies)], own[len(bodies) :])
+
+
+def _exceptions(bodies, planes, meet_bodies: bool, friction_of: FrictionOf) -> list[tuple[int, int, float]]:
+    """Pairs (body, body or -1 - wall, friction) that touch with another friction than the larger of their surfaces.
+
+    A plane that only some bodies touch, or a pair of bodies that pass through each other, keeps the larger one.
+    """
+    pairs = []
+    for i, a in enumerate(bodies):
+        others = [(-1 - k, plane) for k, plane in enumerate(planes)]
+        others += list(enumerate(bodies))[i + 1 :] if meet_bodies else []
+        for j, b in others:
+            mu = friction_of(a, b)
+            if mu is not None and mu != max(LEAST_FRICTION, a.friction, b.friction):
+                pairs.append((i, j, mu))
+    return pairs
 
 
 def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
@@ -128,25 +156,3 @@ def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
             )
         )
     return bool(touching)
-
-
-def _agreed_friction(met: list[_Met], left: LeftOut) -> float:
-    """Friction coefficient that most of the touching pairs have; messages about other coefficients go to `left`."""
-    number: Counter[float] = Counter()
-    first: dict[float, _Met] = {}
-    for pair in met:
-        if pair.friction is not None:
-            number[pair.friction] += pair.count
-            first.setdefault(pair.friction, pair)
-    friction = max(number, key=lambda value: (number[value], value))
-    for value, pair in first.items():
-        if value != friction:
-            common = first[friction]
-            left.add(
-                ModelError(
-                    f"friction is {value:g} between {pair.a.label} and {pair.b.label}, and {friction:g} between "
-                    f"{common.a.label} and {common.b.label}; allowed is one coefficient",
-                    pair.a.line,
-                )
-            )
-    return friction

@@ -52,7 +52,7 @@ def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list
     """Read a scene from an MJCF or URDF file.
 
     If MuJoCo is installed, it compiles the file. The scene gets these parts of the compiled model: free bodies of one
-    box, sphere, ellipsoid or convex mesh, planes, gravity, one coefficient of friction, one damping of all free joints,
+    box, sphere, ellipsoid or convex mesh, planes, gravity, friction of every pair, one damping of all free joints,
     and the pose and velocity of the first keyframe. Without MuJoCo only elements that `save_mjcf` writes are read.
 
     Parameters

@@ -6,14 +6,16 @@ motion and are skipped. All others are refused.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from physics import validation
-from physics.io.mjcf.contacts import Surface, contact_effects, touched
+from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.shapes import Placed, make_body
 from physics.io.mjcf.text import Element, ModelError, label
-from physics.io.mjcf.writer import unnamed
+from physics.io.mjcf.writer import unnamed, wall_name
 from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
 from physics.optional import INSTALLED_BY
 from physics.rotations import rotation_matrices
@@ -29,7 +31,7 @@ SHAPES = ("box", "sphere", "ellipsoid", "mesh")
 
 # For each element that is read: its attributes, and the elements within it.
 ELEMENTS: dict[str, tuple[str, str]] = {
-    "mujoco": ("model", "compiler option worldbody keyframe asset"),
+    "mujoco": ("model", "compiler option worldbody keyframe asset contact"),
     "compiler": ("angle", ""),
     "option": ("gravity", ""),
     "asset": ("", "mesh"),
@@ -40,6 +42,8 @@ ELEMENTS: dict[str, tuple[str, str]] = {
     "joint": ("name type", ""),
     "inertial": ("pos quat mass diaginertia fullinertia", ""),
     "geom": ("name type size pos quat zaxis mesh mass density contype conaffinity condim friction", ""),
+    "contact": ("", "pair"),
+    "pair": ("name geom1 geom2 condim friction", ""),
     "keyframe": ("", "key"),
     "key": ("name qpos qvel", ""),
 }
@@ -57,7 +61,7 @@ HARMLESS_ELEMENTS = {
 }
 HARMLESS_ATTRIBUTES = {"group", "material", "rgba"}
 ABSENT = {"actuator", "deformable", "equality", "tendon"}  # elements without a counterpart in a scene
-MANY = {"body", "geom", "joint", "key", "mesh"}  # elements of which another one may hold several
+MANY = {"body", "geom", "joint", "key", "mesh", "pair"}  # elements of which another one may hold several
 
 
 def read_scene(root: Element) -> Scene:
@@ -79,10 +83,46 @@ def read_scene(root: Element) -> Scene:
     option = root.find("option")
     gravity = _numbers(root if option is None else option, "gravity", 3, DEFAULT_GRAVITY)
     effects = [Gravity(gravity)] if gravity.any() else []
-    surfaces, floors = [_surface(element.find("geom")) for element in elements], [_surface(plane) for plane in planes]
-    contact = contact_effects(surfaces, [floor for floor in floors if touched(floor, surfaces)], LeftOut())
-    walls = [_wall(plane) for plane, floor in zip(planes, floors) if not contact or touched(floor, surfaces)]
-    return Scene(bodies, walls, effects + contact)
+    pairs = _listed_pairs(root)
+    geoms = [*(element.find("geom") for element in elements), *planes]
+    names, told = [geom.get("name") for geom in geoms], {name for pair in pairs for name in pair}
+    # only a listed geom has a number: surfaces of all others are equal if their properties are
+    every = [_surface(geom, k if names[k] in told else -1) for k, geom in enumerate(geoms)]
+    surfaces, floors = every[: len(elements)], every[len(elements) :]
+
+    def friction_of(a: Surface, b: Surface) -> float | None:
+        listed = pairs.get(frozenset((names[a.geom], names[b.geom]))) if a.geom >= 0 and b.geom >= 0 else None
+        return dynamic_friction(a, b) if listed is None else listed
+
+    met = [k for k, floor in enumerate(floors) if touched(floor, surfaces, friction_of)]
+    contact = find_contact(surfaces, [floors[k] for k in met], LeftOut(), friction_of)
+    bodies = [replace(body, friction=mu) for body, mu in zip(bodies, contact.bodies)]
+    met, frictions = (met, contact.planes) if contact.effects else (list(range(len(planes))), [None] * len(planes))
+    taken = {body.name for body in bodies}
+    walls = [_wall(k, planes[plane], mu, taken) for k, (plane, mu) in enumerate(zip(met, frictions))]
+    return Scene(bodies, walls, effects + contact.effects)
+
+
+def _listed_pairs(root: Element) -> dict[frozenset[str], float]:
+    """Friction of the pairs of geoms that the text lists, by the names of both."""
+    known, found = {geom.get("name") for geom in root.iterfind("worldbody//geom")} - {None}, {}
+    for pair in root.iterfind("contact/pair"):
+        for key in ("geom1", "geom2"):
+            if pair.get(key) not in known:
+                names = ", ".join(sorted(map(str, known))) or "none"
+                raise _error(pair, f"has {key}={pair.get(key)!r}; allowed are the names of geoms: {names}")
+        needed = ("condim", "friction") if pair.get("condim") != "1" else ("condim",)
+        for key in needed:
+            if pair.get(key) is None:
+                raise _unread(pair, f"has no {key}; allowed is one, since versions of MuJoCo differ in its default")
+        mu = 0.0
+        if _condim(pair, 0) == 3:
+            numbers = _numbers(pair, "friction", 5, least=2)
+            mu = max(LEAST_FRICTION, float(numbers[0]))
+            if numbers[0] != numbers[1]:
+                raise _error(pair, f"has friction={pair.get('friction')!r}; allowed are two equal coefficients")
+        found[frozenset((pair.get("geom1"), pair.get("geom2")))] = mu
+    return found
 
 
 def _label(element: Element) -> str:
@@ -156,8 +196,8 @@ def _refuse(element: Element, *keys: str) -> None:
             raise _unread(element, f"has {key}={element.get(key)!r}, which is not read here; allowed is none")
 
 
-def _wall(plane: Element) -> HalfSpace:
-    """Make the wall of a plane geom; bodies are on its +z side."""
+def _wall(k: int, plane: Element, friction: float | None, taken: set) -> HalfSpace:
+    """Make wall number `k` of a plane geom; bodies are on its +z side. It gets no name that is `taken` by a body."""
     _refuse(plane, "mesh")
     if plane.get("quat") is not None:
         _refuse(plane, "zaxis")
@@ -165,7 +205,11 @@ def _wall(plane: Element) -> HalfSpace:
     if plane.get("zaxis") is not None:
         normal = _numbers(plane, "zaxis", 3)
     wall = HalfSpace(normal)
-    return HalfSpace(wall.normal, float(np.array(wall.normal) @ _numbers(plane, "pos", 3, "0 0 0")))
+    offset, name = (
+        float(np.array(wall.normal) @ _numbers(plane, "pos", 3, "0 0 0")),
+        wall_name(k, plane.get("name"), taken),
+    )
+    return HalfSpace(wall.normal, offset, name=name, friction=friction)
 
 
 def _unit(element: Element) -> np.ndarray:
@@ -267,15 +311,20 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
     return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), np.diag(moments))
 
 
-def _surface(geom: Element) -> Surface:
-    condim = _integer(geom, "condim", 3)
+def _condim(element: Element, default: int) -> int:
+    condim = _integer(element, "condim", default)
     if condim not in (1, 3):
-        raise _error(geom, f"has condim {condim}; allowed are 1 and 3")
+        raise _error(element, f"has condim {condim}; allowed are 1 and 3")
+    return condim
+
+
+def _surface(geom: Element, number: int) -> Surface:
     return Surface(
         _label(geom),
         geom.line,
         _integer(geom, "contype", 1),
         _integer(geom, "conaffinity", 1),
-        condim,
+        _condim(geom, 3),
         float(_numbers(geom, "friction", 3, DEFAULT_FRICTION, least=1)[0]),
+        geom=number,
     )

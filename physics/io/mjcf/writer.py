@@ -8,10 +8,12 @@ The velocities at the start are in a keyframe `start`.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
 
+from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
@@ -24,6 +26,27 @@ KEYFRAME = "start"
 def unnamed(b: int) -> str:
     """Name in MJCF of body number `b` of a scene if it has no name of its own."""
     return f"body{b}"
+
+
+def unnamed_wall(k: int) -> str:
+    """Name in MJCF of wall number `k` of a scene if it has no name of its own, and a pair names it."""
+    return f"wall{k}"
+
+
+def wall_name(k: int, name: str | None, taken: Container[str | None]) -> str | None:
+    """Name of wall number `k` of a scene, from the name of its geom in MJCF.
+
+    It is None if the geom has no name, one of those that the writer gives, or one that no wall may have: a name
+    `taken` by a body, or with characters that do not print.
+    """
+    if not name or name == unnamed_wall(k) or name in taken or name != name.strip() or not name.isprintable():
+        return None
+    return name
+
+
+def geom_name(b: int) -> str:
+    """Name in MJCF of the geom of body number `b` of a scene, if a pair names it."""
+    return f"geom{b}"
 
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
@@ -39,15 +62,24 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
     _add_meshes(root, scene)
     world = ET.SubElement(root, "worldbody")
-    surface: Any = _surface(scene)
-    for wall in scene.walls:
+    frictions = Frictions(scene)
+    pairs = list(frictions.exceptions())
+    for k, wall in enumerate(scene.walls):
+        name = wall.name or (unnamed_wall(k) if pairs else None)
+        named: Any = {} if name is None else {"name": name}
         touch: Any = {"contype": "0", "conaffinity": "1" if scene.effect(Contact) else "0"}
         place: Any = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
-        ET.SubElement(world, "geom", type="plane", **place, **touch, **surface)
+        surface = _surface(frictions.walls[k], frictions)
+        ET.SubElement(world, "geom", **named, type="plane", **place, **touch, **surface)
     springs = [effect for effect in scene.effects if isinstance(effect, Spring)]
     _check_names(scene)
     for b, body in enumerate(scene.bodies):
+        surface = _surface(frictions.bodies[b], frictions)
+        if pairs:
+            surface["name"] = geom_name(b)
         _add_body(world, b, body, scene.effect(Contact), surface, springs)
+    if pairs:
+        _add_pairs(root, scene, pairs)
     if springs:
         _add_springs(root, world, springs)
     _add_keyframe(root, scene)
@@ -56,14 +88,27 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 
 def _check_names(scene: Scene) -> None:
-    """Raise a ValueError if a body has the name that the file gives to a body without a name."""
-    taken = {unnamed(b): b for b, body in enumerate(scene.bodies) if body.name is None}
-    for b, body in enumerate(scene.bodies):
-        if body.name in taken:
-            raise ValueError(
-                f"Scene.bodies[{b}] has the name {body.name!r}, which MJCF gives to Scene.bodies[{taken[body.name]}]; "
-                "allowed are other names"
-            )
+    """Raise a ValueError if a body or wall has the name that the file gives to another one, which has none."""
+    for kind, items, name_of in (("bodies", scene.bodies, unnamed), ("walls", scene.walls, unnamed_wall)):
+        taken = {name_of(k): k for k, item in enumerate(items) if item.name is None}
+        if kind == "walls":
+            taken.update({geom_name(b): b for b in range(len(scene.bodies))})
+        for k, item in enumerate(items):
+            if item.name in taken:
+                raise ValueError(
+                    f"Scene.{kind}[{k}] has the name {item.name!r}, which MJCF gives to Scene.{kind}"
+                    f"[{taken[item.name]}]; allowed are other names"
+                )
+
+
+def _add_pairs(root: ET.Element, scene: Scene, pairs: list[tuple[int, int, float]]) -> None:
+    """Add the pairs (body, other body or -1 - wall, friction) that do not have the larger friction of their geoms."""
+    element = ET.SubElement(root, "contact")
+    for body, other, mu in pairs:
+        wall = -1 - other
+        second = geom_name(other) if other >= 0 else scene.walls[wall].name or unnamed_wall(wall)
+        friction: Any = {"condim": "3", "friction": _text((mu, mu, 0, 0, 0))} if mu > 0 else {"condim": "1"}
+        ET.SubElement(element, "pair", geom1=geom_name(body), geom2=second, **friction)
 
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
@@ -76,7 +121,9 @@ def _add_meshes(root: ET.Element, scene: Scene) -> None:
 
 def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
-    lost: list[Any] = [contact] if contact and (contact.restitution or contact.tangential or contact.stiffness) else []
+    rebounds = contact and (contact.restitution or any(mu for _, _, mu in contact.restitution_pairs))
+    lost: list[Any] = [contact] if contact and (rebounds or contact.tangential or contact.stiffness) else []
+    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution]
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
@@ -87,15 +134,14 @@ def _text(numbers) -> str:
     return " ".join(repr(float(number)) for number in np.ravel(numbers))
 
 
-def _surface(scene: Scene) -> dict[str, str]:
-    """Attributes of all geoms for the scene's friction.
+def _surface(mu: float, frictions: Frictions) -> dict[str, str]:
+    """Attributes of a geom with the friction mu.
 
-    Without friction they are condim 1, since MuJoCo would raise a coefficient of 0 to 1e-5.
+    Without friction it has condim 1, since MuJoCo would raise a coefficient of 0 to 1e-5.
     """
-    friction = scene.effect(Friction)
-    if friction is None or friction.axis is not None or friction.coefficient == 0:
+    if frictions.is_none:
         return {"condim": "1"}
-    return {"condim": "3", "friction": _text((friction.coefficient, 0, 0))}
+    return {"condim": "3" if mu > 0 else "1", "friction": _text((mu, 0, 0))}
 
 
 def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:

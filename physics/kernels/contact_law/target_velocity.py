@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from physics.compiler.decorators import inlined, kernel
 from physics.compiler.simd import LANE_COUNT, larger, select_lanes, smaller
+from physics.kernels.contact_law.materials import least_bounce_speed, restitution_of
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, wall_normal, wall_of
 from physics.kernels.half_space.persistent_contacts import is_persistent_contact
 from physics.kernels.math import quaternion as qt
@@ -77,9 +78,10 @@ def set_impact_targets(n, bounce_speed, slop_speed, y, h, offset_frame, memory, 
     for i in range(n):
         s = -contacts.speed[i]
         goal = 0.0
-        is_bounce = scratch.body.restitution > 0.0 and s > bounce_speed
+        e = restitution_of(contacts.slot[i], scratch)
+        is_bounce = e > 0.0 and s > least_bounce_speed(bounce_speed, contacts.slot[i], scratch)
         if is_bounce or s < 0.0:
-            goal = scratch.body.restitution * s
+            goal = e * s
         if is_bounce or s > slop_speed + max(contacts.gap[i], 0.0) * rate:
             if is_persistent_contact(i, y, h, offset_frame, memory, scratch):
                 contacts.speed[i] = goal = 0.0

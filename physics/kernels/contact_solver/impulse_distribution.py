@@ -5,6 +5,7 @@ from __future__ import annotations
 from physics.compiler.decorators import inlined
 from physics.compiler.simd import LANE_COUNT, first_true_lane, lane_sqrt, lane_sum, select_lanes
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio
+from physics.kernels.contact_law.materials import friction_at, friction_of
 from physics.kernels.half_space.contact_point import contact_arm, wall_axis, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.simd_gather import gather_column, gather_numbers, valid_lanes_mask
@@ -43,9 +44,9 @@ def first_active(n, solver):
 
 
 @inlined
-def is_in_cone(pn, pa, pb, body):
-    """True if the impulse (pn, pa, pb), normal and tangents, is in the friction cone of the body."""
-    limit, b = body.mu * pn, pb / friction_ratio(body)
+def is_in_cone(pn, pa, pb, slot, scratch):
+    """True if the impulse (pn, pa, pb), normal and tangents, is in the friction cone of the contact in `slot`."""
+    limit, b = friction_of(slot, scratch) * pn, pb / friction_ratio(scratch.body)
     return pa * pa + b * b <= limit * limit
 
 
@@ -76,7 +77,7 @@ def distribute_by_bolt_group(n, count, c, F, a, scratch):
         if not pn >= lowest:
             lowest = pn
             loser = i
-        if not is_in_cone(pn, pa, pb, scratch.body):
+        if not is_in_cone(pn, pa, pb, scratch.contacts.slot[i], scratch):
             holds = False
     return loser, holds
 
@@ -122,7 +123,7 @@ def distribute_by_load(n, scratch):
         on * gather_column(solver.across, 0, n),
         on * gather_column(solver.across, 1, n),
     )
-    fa, fb, spin, limit, g = lane_sum(x), lane_sum(y), lane_sum(a * y - b * x), scratch.body.mu * p, p
+    fa, fb, spin, limit, g = lane_sum(x), lane_sum(y), lane_sum(a * y - b * x), friction_at(wall, scratch.body) * p, p
     for _ in range(_MAX_WEISZFELD_STEPS):
         s = 1.0 / lane_sum(g)
         ca, cb = s * lane_sum(g * a), s * lane_sum(g * b)

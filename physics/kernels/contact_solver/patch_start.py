@@ -61,16 +61,17 @@ def _centroid_and_variance(n, a, b, on):
 
 
 @inlined
-def may_stick(n, axes, v, L, scratch):
+def may_stick(n, mu, axes, v, L, scratch):
     """True if friction may stop a face of n contacts, with velocity v and angular momentum L without impulses.
 
     The result is true for every face that can stick. A sticking face stops at its wall: normal impulses of the sum P
     remove the normal momentum, and friction, at most μP, removes the tangential momentum. The moment of friction about
     the centroid is at most μ Σ p_i |d_i| <= μP max |d_i|. If all faces were tried as sticking, one that slips within
-    the tolerance of a solve would be taken for sticking, and creep. `axes` are normal and tangents of the wall.
+    the tolerance of a solve would be taken for sticking, and creep. mu is the friction coefficient at the wall, and
+    `axes` are its normal and tangents.
     """
     body = scratch.body
-    ratio, friction = friction_ratio(body), body.mu * qt.dot(axes[0], v)
+    ratio, friction = friction_ratio(body), mu * qt.dot(axes[0], v)
     va, vb, limit = qt.dot(axes[1], v), qt.dot(axes[2], v) / ratio, friction * friction
     spin, slip = qt.dot(axes[0], L) / body.mass, va * va + vb * vb
     if slip > limit or (slip == 0.0 and spin == 0.0):

@@ -75,7 +75,7 @@ def _fixed_point_residual(n, factor, inv_mass, scratch):
             )
             y[s] = q[s] - rho * u
         y[r] = scale_by_compliance(y[r], rho, body)
-        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), body.mu * max(y[r], 0.0)
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), contacts.friction[i] * max(y[r], 0.0)
         s = limit / size if size > limit else 1.0
         p[r], p[r + 1], p[r + 2] = max(y[r], 0.0), s * y[r + 1], s * y[r + 2]
         for s in range(r, r + 3):
@@ -110,7 +110,7 @@ def _fill_newton_matrix(n, factor, inv_mass, scratch):
         if not y[r] > 0.0:
             continue
         rho = factor * solver.local[i, LOCAL_NORMAL_RHO]
-        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), body.mu * y[r]
+        size, limit = math.sqrt(y[r + 1] * y[r + 1] + y[r + 2] * y[r + 2]), contacts.friction[i] * y[r]
         da = db = 0.0
         k11 = k22 = 1.0
         k12 = 0.0
@@ -123,8 +123,8 @@ def _fill_newton_matrix(n, factor, inv_mass, scratch):
             pa = k11 * ja + k12 * jb
             pb = k12 * ja + k22 * jb
             if size > limit:
-                pa += body.mu * da * jn
-                pb += body.mu * db * jn
+                pa += contacts.friction[i] * da * jn
+                pb += contacts.friction[i] * db * jn
             for a in range(3):
                 A[a, b] += inv_mass * (frame[r, a] * jn + frame[r + 1, a] * pa + frame[r + 2, a] * pb)
                 A[a + 3, b] += response[r, a] * jn + response[r + 1, a] * pa + response[r + 2, a] * pb

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from physics.compiler.decorators import inlined
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, stretched_frame
+from physics.kernels.contact_law.materials import friction_of
 from physics.kernels.contact_solver.contact_pair import contact_in_wall_frame
 from physics.kernels.contact_solver.one_contact import FreeBody, motion_in_wall_frame, wall_to_world
 from physics.kernels.contact_solver.patch import PatchProblem, gather_patch
@@ -53,16 +54,17 @@ def _solve_face(n, friction, body, scratch):
     `friction` is None without friction, and `body` is a `FreeBody`.
     """
     patch, on = gather_patch(n, body, scratch), valid_lanes_mask(n)
+    mu = friction_of(scratch.contacts.slot[0], scratch)
     scale = largest_free_speed(friction, patch, body)
     start, is_mixed = (body.u[1], body.u[2], body.w[0]), False
     if friction is not None:
         start, is_of_now = warm_start_motion(n, patch, on, body, scratch)
         is_mixed = is_of_now and scratch.stage.mode == TRY_MIXED
-        if not is_of_now and scratch.body.mu > 0.0:
-            start = cold_start_motion(n, patch, on, scratch.body.mu, body)
+        if not is_of_now and mu > 0.0:
+            start = cold_start_motion(n, patch, on, mu, body)
     goal = scratch.settings.tolerance * scale
     loose = max(goal, _CLOSING_TOLERANCE * scale) if n > 3 else goal
-    problem = PatchProblem(patch, body, scratch.body.mu, goal, loose)
+    problem = PatchProblem(patch, body, mu, goal, loose)
     for patient in range(2):
         face, has_opened = solve_sliding_patch(n, patient > 0, problem, start, is_mixed, scratch)
         if face.found:
@@ -100,16 +102,14 @@ def _solve_one_or_two(n, friction, body, scratch):
 
     `friction` is None without friction, and `body` is a `FreeBody`.
     """
-    first = contact_in_wall_frame(0, body, scratch)
+    first, mu = contact_in_wall_frame(0, body, scratch), friction_of(scratch.contacts.slot[0], scratch)
     scale = _largest_component(friction, first.approach)
     if n == 1:
-        found, p, m, miss = solve_one_contact(first, scratch.body.mu, scratch.settings.tolerance * scale, body, scratch)
+        found, p, m, miss = solve_one_contact(first, mu, scratch.settings.tolerance * scale, body, scratch)
     else:
         second = contact_in_wall_frame(1, body, scratch)
         scale = max(scale, _largest_component(friction, second.approach))
-        found, p, q, m, miss = solve_two_contacts(
-            first, second, scratch.body.mu, scratch.settings.tolerance * scale, body, scratch
-        )
+        found, p, q, m, miss = solve_two_contacts(first, second, mu, scratch.settings.tolerance * scale, body, scratch)
         if found:
             _store_impulse(1, q, friction, scratch)
             scratch.stage.mode = TRY_SLIDING

@@ -9,6 +9,7 @@ from physics.compiler.decorators import if_given, inlined, kernel, shared_kernel
 from physics.compiler.simd import LANE_COUNT
 from physics.kernels.contact_law.anisotropic_friction import stretch_tangents, unstretch_tangents
 from physics.kernels.contact_law.compliance import add_delassus_compliance, contact_stiffness
+from physics.kernels.contact_law.materials import friction_at, friction_of
 from physics.kernels.contact_solver.friction_pyramid import solve_normal_lcp, solve_pyramid_lcp
 from physics.kernels.contact_solver.gauss_seidel import (
     assemble_delassus,
@@ -156,7 +157,7 @@ def _solve_directly(n, friction, R, v, L, scratch):
     if may_all_hold and n > 1:
         holds_first = stage.mode == TRY_STICKING
         if is_one_wall and n > 2:
-            holds_first = may_stick(n, wall_axes(scene.walls, wall), v, L, scratch)
+            holds_first = may_stick(n, friction_at(wall, scratch.body), wall_axes(scene.walls, wall), v, L, scratch)
     found, v_new, L_new, residual = False, v, L, 0.0
     if holds_first:
         found, v_new, L_new, residual = _solve_sticking(n, R, v, L, scratch)
@@ -201,7 +202,7 @@ def _sweep_and_newton(n, contact, goal, scratch):
     steps, residual = 0, 0.0
     invert_contact_blocks(n, scratch)
     for i in range(n):
-        scratch.contacts.friction[i] = scratch.body.mu
+        scratch.contacts.friction[i] = friction_of(scratch.contacts.slot[i], scratch)
     left, at_once, turns = scratch.settings.sweeps, _SWEEPS_PER_ROUND, 0
     if contact_stiffness(scratch.body) > 0.0:
         # Newton's method first: it distributes tangential impulses evenly, and normal impulses are unique here.

@@ -296,7 +296,7 @@ def _restore_moment(n, group, T, scratch):
         pa = solver.across[i, 0] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_1), p)
         pb = solver.across[i, 1] + qt.dot(wall_axis(walls, wall, WALL_TANGENT_2), p)
         solver.normal[i], solver.across[i, 0], solver.across[i, 1] = pn, pa, pb
-        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, scratch.body)):
+        if not (pn >= 0.0 and is_in_cone(pn, pa, pb, contacts.slot[i], scratch)):
             return False
     return True
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import may_hold
 from physics.kernels.contact_solver.sliding_patch import TRY_STICKING
 from physics.kernels.event_driven.contact_candidates import (
     CANDIDATE_OPEN,
@@ -147,7 +148,7 @@ def read_resting_mode(count, y, a, moment, friction, has_sliding, offset_frame, 
         kind = CANDIDATE_SLIDING
         if not push > small * body.mass and (an > small or is_redundant_contact(i, count, width, small, scratch)):
             kind = CANDIDATE_OPEN
-        elif friction is not None and not slides and size <= small:
+        elif friction is not None and not slides and size <= small and may_hold(candidates.slot[i], scratch):
             kind = CANDIDATE_STICKING
         candidates.state[i] = kind
         if slides:

@@ -31,6 +31,7 @@ import math
 
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import sliding_direction
+from physics.kernels.contact_law.materials import limited_friction
 from physics.kernels.half_space.contact_point import contact_arm_and_rate, feature_of, wall_axes, wall_normal, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, plus, row_vector, times
@@ -149,9 +150,10 @@ def _add_shares(mu, scratch, motion):
     force = moment = (0.0, 0.0, 0.0)
     if mu > 0.0:
         for j in range(contacts.count):
-            axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
+            wall = wall_of(contacts.slot[j], scratch.scene)
+            axes, coefficient = wall_axes(scratch.scene.walls, wall), limited_friction(mu, wall, scratch.body)
             p = row_vector(contacts.given_force, j, 0)
-            f = _contact_force(p[0], p[1], p[2], mu, axes, j, scratch.body, contacts)
+            f = _contact_force(p[0], p[1], p[2], coefficient, axes, j, scratch.body, contacts)
             force, moment = plus(force, f), plus(moment, qt.cross(row_vector(contacts.arm, j, 0), f))
     for c in range(3):
         motion.unknowns.given_wrench[0, c], motion.unknowns.given_wrench[1, c] = force[c], moment[c]
@@ -219,7 +221,7 @@ def assemble_unknowns(mu, holding, scratch, motion):
 
     Filled are columns (force and moment per unknown), rows (directions of constraints), `given_wrench`, and right-hand
     sides, from `constraint_error` of the contacts. `holding` is true if sticking contacts also have equations along the
-    wall. mu is the friction coefficient.
+    wall. mu is the largest friction coefficient at any wall, or 0 for a problem without friction.
     """
     scene = scratch.scene
     unknowns, contacts = motion.unknowns, motion.contacts
@@ -230,14 +232,14 @@ def assemble_unknowns(mu, holding, scratch, motion):
             unknowns.is_skew = 1
     while first < contacts.count:
         wall = wall_of(contacts.slot[first], scene)
-        axes = wall_axes(scene.walls, wall)
+        axes, coefficient = wall_axes(scene.walls, wall), limited_friction(mu, wall, scratch.body)
         last = first
         while last < contacts.count and wall_of(contacts.slot[last], scene) == wall:
             contacts.patch[last] = NO_PATCH
             last += 1
         own = 0  # first axis along which a sticking contact has an unknown of its own
         if last - first >= MIN_PATCH_CONTACTS:
-            m = _add_patch_unknowns(m, first, last, mu, axes, scratch.body, motion)
+            m = _add_patch_unknowns(m, first, last, coefficient, axes, scratch.body, motion)
             own = 1
         for j in range(first, last):
             if holding and contacts.sticks[j]:
@@ -247,7 +249,7 @@ def assemble_unknowns(mu, holding, scratch, motion):
                 _add_to_unknown(
                     m,
                     row_vector(contacts.arm, j, 0),
-                    sliding_force_direction(mu, axes, j, scratch.body, contacts),
+                    sliding_force_direction(coefficient, axes, j, scratch.body, contacts),
                     axes[0],
                     1.0,
                     unknowns,
@@ -267,7 +269,8 @@ def recover_contact_forces(mu, scratch, motion):
     """
     contacts, unknowns = motion.contacts, motion.unknowns
     for j in range(contacts.count):
-        axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[j], scratch.scene))
+        wall = wall_of(contacts.slot[j], scratch.scene)
+        axes, coefficient = wall_axes(scratch.scene.walls, wall), limited_friction(mu, wall, scratch.body)
         k, p, f = contacts.first_unknown[j], contacts.patch[j], row_vector(contacts.given_force, j, 0)
         if not mu > 0.0:  # `_add_shares` leaves given forces out: the unknowns are the whole force
             f = (0.0, 0.0, 0.0)
@@ -284,7 +287,7 @@ def recover_contact_forces(mu, scratch, motion):
         first = second = 0.0
         if contacts.sticks[j]:
             first, second = f[1] + unknowns.value[k], f[2] + unknowns.value[k + 1]
-        f = _contact_force(contacts.normal[j], first, second, mu, axes, j, scratch.body, contacts)
+        f = _contact_force(contacts.normal[j], first, second, coefficient, axes, j, scratch.body, contacts)
         contacts.force[j, 0], contacts.force[j, 1], contacts.force[j, 2] = f
 
 

@@ -10,6 +10,7 @@ import math
 
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import unstretch_force
+from physics.kernels.contact_law.materials import friction_of, may_hold
 from physics.kernels.event_driven.contact_candidates import (
     CANDIDATE_OPEN,
     CANDIDATE_SLIDING,
@@ -87,11 +88,12 @@ def _worst_violation(count, rates, scale, offset_frame, scratch, motion):
     for i in range(count):
         an, at = contact_acceleration(i, R, w, a, alpha, offset_frame, scratch, candidates)
         if candidates.state[i] == CANDIDATE_OPEN and an < -_EXACT_ZERO_SHARE * scale:
-            return i, CANDIDATE_SLIDING if candidates.is_fresh[i] == 0 else CANDIDATE_STICKING
+            holds = candidates.is_fresh[i] != 0 and may_hold(candidates.slot[i], scratch)
+            return i, CANDIDATE_STICKING if holds else CANDIDATE_SLIDING
         if candidates.state[i] == CANDIDATE_SLIDING and candidates.is_fresh[i]:
             size = math.sqrt(qt.dot(at, at))
             along = qt.dot(at, row_vector(candidates.direction, i, 0))
-            if along < 0.0:
+            if along < 0.0 and may_hold(candidates.slot[i], scratch):
                 return i, CANDIDATE_STICKING
             if size > _EXACT_ZERO_SHARE * scale and size - along > 0.5 * _SAME_DIRECTION * size:
                 for c in range(3):
@@ -123,7 +125,7 @@ def search_modes_once(count, y, R, P, w, alpha_free, offset_frame, scratch, moti
         candidates.state[i] = CANDIDATE_SLIDING
         if not is_candidate_sliding(i, y, R, w, offset_frame, scratch, motion):
             candidates.is_fresh[i] = 1
-            if body.mu > 0.0:
+            if friction_of(candidates.slot[i], scratch) > 0.0:
                 candidates.state[i] = CANDIDATE_STICKING
     f = as_vector(body.free_acceleration)
     for _ in range(_MAX_MODE_TRIALS):

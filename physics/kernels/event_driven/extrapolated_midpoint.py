@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import friction_of
 from physics.kernels.event_driven.contact_forces import free_angular_motion, set_contact_kinematics
 from physics.kernels.event_driven.force_system import solve_mode_forces
 from physics.kernels.event_driven.slip_onset import (
@@ -235,7 +236,7 @@ def prepare_extrapolated_step(left, offset_frame, scratch, motion):
     contacts.slip_turn_rate = contacts.friction_turn_stiffness = 0.0
     _set_first_rate(offset_frame, scratch, motion)
     turn = motion.smooth.start_angular_speed = math.sqrt(qt.dot(w, w))
-    if has_one_sliding_contact(body, contacts):
+    if has_one_sliding_contact(scratch, contacts):
         _begin_slide(P, offset_frame, scratch, motion)
     motion.smooth.weight = body.mass * (body.acceleration + body.radius * turn * turn)
     h = min(left, motion.pace.step_length)
@@ -302,7 +303,7 @@ def _limit_to_slip_stop(h, P, scratch, motion):
     """
     contacts = motion.contacts
     for j in range(contacts.count):
-        if contacts.sticks[j] or contacts.is_starting[j] or not scratch.body.mu > 0.0:
+        if contacts.sticks[j] or contacts.is_starting[j] or not friction_of(contacts.slot[j], scratch) > 0.0:
             continue
         d = row_vector(contacts.start_slip_direction, j, 0)
         _, speed = sliding_velocity(j, scratch.scene, contacts)

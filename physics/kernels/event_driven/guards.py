@@ -22,6 +22,7 @@ import math
 
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import unstretch_force
+from physics.kernels.contact_law.materials import friction_at, friction_of
 from physics.kernels.event_driven.contact_forces import NO_PATCH, free_angular_motion, recover_contact_forces
 from physics.kernels.event_driven.extrapolated_midpoint import compute_state_rate, get_state_row, sliding_velocity
 from physics.kernels.event_driven.workspace import ROW_END, ROW_START, Y_VELOCITY
@@ -168,8 +169,8 @@ def cone_excess(j, scratch, contacts):
             other = k
             holding += 1
     if holding == 2 and contacts.normal[j] >= 0.0 and contacts.normal[other] >= 0.0:
-        return _pair_excess(j, other, scratch.body.mu, scratch, contacts)
-    return _cone_excess(j, scratch.body.mu, scratch, contacts)
+        return _pair_excess(j, other, friction_at(wall, scratch.body), scratch, contacts)
+    return _cone_excess(j, friction_at(wall, scratch.body), scratch, contacts)
 
 
 @inlined
@@ -275,7 +276,7 @@ def least_guard_margin(h, heeds, slack, offset_frame, scratch, motion):
     if body.mu > 0.0 and margin >= 0.0:  # a contact may stop within the step, unless something ends it before
         scale = smooth.scale[Y_VELOCITY]
         for j in range(contacts.count):
-            if not contacts.sticks[j]:
+            if not contacts.sticks[j] and friction_of(contacts.slot[j], scratch) > 0.0:
                 t, _ = sliding_velocity(j, scratch.scene, contacts)
                 speed = qt.dot(t, row_vector(contacts.start_slip_direction, j, 0))
                 still = thresholds.slip_stop_speed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import has_different_walls, restitution_at, restitution_of
 from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDING, limit_rebound_energy
 from physics.kernels.contact_solver.sliding_patch import TRY_SLIDING
 from physics.kernels.contact_solver.solve import rows_per_contact, solve_contacts
@@ -38,8 +39,8 @@ _ALL_AT_ONCE = -1
 
 
 @inlined
-def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
-    """Target normal velocity of a contact that approaches with `speed` [m/s] in an impact.
+def rebound_target(speed, e, normal, r, rate, w, alpha, body, motion):
+    """Target normal velocity of a contact that approaches with `speed` [m/s] in an impact; e is its restitution.
 
     A contact rebounds at e times its speed, unless this is below `thresholds.rest_speed`, which counts as zero. A
     leaving contact (speed < 0) may be
@@ -52,16 +53,16 @@ def rebound_target(speed, normal, r, rate, w, alpha, body, motion):
     """
     thresholds, pace = motion.thresholds, motion.pace
     if speed < -thresholds.rest_speed:
-        return body.restitution * speed
+        return e * speed
     if not speed > thresholds.rest_speed:
         return 0.0
-    goal = body.restitution * speed
+    goal = e * speed
     if goal > thresholds.rest_speed:
         return goal
     a, c, g = as_vector(body.free_acceleration), qt.cross(alpha, r), qt.cross(w, rate)
     b = -(qt.dot(normal, a) + qt.dot(normal, c) + qt.dot(normal, g))
-    if b > 0.0 and body.restitution < 1.0:
-        pace.skipped_bounce_time = max(pace.skipped_bounce_time, 2.0 * goal / (b * (1.0 - body.restitution)))
+    if b > 0.0 and e < 1.0:
+        pace.skipped_bounce_time = max(pace.skipped_bounce_time, 2.0 * goal / (b * (1.0 - e)))
     return 0.0
 
 
@@ -115,11 +116,12 @@ def set_up_impact_problem(y, offset_frame, scratch, motion, report):
             or (only != _ALL_AT_ONCE and s != only)
         ):
             continue
-        normal = wall_normal(scene.walls, wall_of(s, scene))
+        wall = wall_of(s, scene)
+        normal, e = wall_normal(scene.walls, wall), restitution_at(wall, body)
         r, r_rate = contact_arm_and_rate(
             body.shape, as_vector(body.dims), R, w, normal, feature_of(s, scene), offset_frame, body
         )
-        goal = rebound_target(-rate, normal, r, r_rate, w, alpha, body, motion)
+        goal = rebound_target(-rate, e, normal, r, r_rate, w, alpha, body, motion)
         set_up_contact(n, s, r, (goal, 0.0, 0.0), scratch.contacts)
         n += 1
         report[body.world, at.PENETRATION] = max(report[body.world, at.PENETRATION], -smooth.gap[ROW_START, s])
@@ -142,7 +144,7 @@ def set_tangential_rebound(n, y, offset_frame, motion, scratch):
     for i in range(n):
         speed = -motion.smooth.gap_rate[ROW_START, scratch.contacts.slot[i]]
         if speed > motion.thresholds.rest_speed and (
-            scratch.contacts.target[i, 0] > 0.0 or not scratch.body.restitution > 0.0
+            scratch.contacts.target[i, 0] > 0.0 or not restitution_of(scratch.contacts.slot[i], scratch) > 0.0
         ):
             bouncing, found = bouncing + 1, i
     if bouncing == 1:
@@ -257,7 +259,7 @@ def resolve_impacts(y, t, contact, offset_frame, scratch, motion, records):
         solved = solve_contacts(n, contact, v, L, P, scratch)
         solved = fall_back_to_plastic(n, contact, v, L, solved, P, scratch, records.report)
         solved = reject_energy_gain(n, contact, v, L, solved, P, scratch)
-        if has_friction(contact) and body.restitution > 0.0:
+        if (has_friction(contact) or has_different_walls(scratch)) and body.restitution > 0.0:
             solved = cap_rebound_energy(
                 n, y, contact, offset_frame, solved, P, scratch, motion.contacts, records.report
             )

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import friction_at, friction_of
 from physics.kernels.event_driven.contact_forces import apply_inverse_inertia, sliding_force_direction
 from physics.kernels.event_driven.workspace import Y_ANGULAR_MOMENTUM, Y_VELOCITY
 from physics.kernels.half_space.contact_point import wall_axes, wall_normal, wall_of
@@ -75,21 +76,21 @@ def contact_velocity_rate(j, P, body, motion):
 @inlined
 def friction_turn_stiffness(P, scratch, motion):
     """Turning stiffness K of the only acting contact, from `first_rate`: acceleration across per radian [m/s²]."""
-    body = scratch.body
-    n = wall_normal(scratch.scene.walls, wall_of(motion.contacts.slot[0], scratch.scene))
+    body, wall = scratch.body, wall_of(motion.contacts.slot[0], scratch.scene)
+    n = wall_normal(scratch.scene.walls, wall)
     across = qt.cross(n, row_vector(motion.contacts.start_slip_direction, 0, 0))
     moment = qt.cross(row_vector(motion.contacts.arm, 0, 0), across)
     a, rate = body.free_acceleration, motion.smooth.first_rate
     push = body.mass * (
         n[0] * (rate[Y_VELOCITY] - a[0]) + n[1] * (rate[Y_VELOCITY + 1] - a[1]) + n[2] * (rate[Y_VELOCITY + 2] - a[2])
     )
-    return body.mu * push * (1.0 / body.mass + qt.dot(moment, apply_inverse_inertia(P, body.J, moment)))
+    return friction_at(wall, body) * push * (1.0 / body.mass + qt.dot(moment, apply_inverse_inertia(P, body.J, moment)))
 
 
 @inlined
-def has_one_sliding_contact(body, contacts):
+def has_one_sliding_contact(scratch, contacts):
     """True if exactly one contact acts, and it slides with friction."""
-    return contacts.count == 1 and contacts.sticks[0] == 0 and body.mu > 0.0
+    return contacts.count == 1 and contacts.sticks[0] == 0 and friction_of(contacts.slot[0], scratch) > 0.0
 
 
 @inlined
@@ -117,7 +118,7 @@ def has_outrun_creep(h, scratch, motion):
     `set_contact_kinematics` must have been called for the end of the step.
     """
     contacts = motion.contacts
-    if not has_one_sliding_contact(scratch.body, contacts) or not contacts.is_starting[0]:
+    if not has_one_sliding_contact(scratch, contacts) or not contacts.is_starting[0]:
         return False
     _, speed = sliding_velocity(0, scratch.scene, contacts)
     if not speed > _CREEP_OVERSHOOT * motion.thresholds.slip_stop_speed:
@@ -129,17 +130,17 @@ def has_outrun_creep(h, scratch, motion):
 
 
 @inlined
-def _slip_accelerations(angle, first, second, axes, P, body, contacts):
+def _slip_accelerations(angle, first, second, axes, P, scratch, contacts):
     """Accelerations of contact 0 across and along a sliding direction d, under the friction opposite to d [m/s²].
 
     d is at the `angle` from the unit vector `first` towards `second`; it is written to `slip_direction`.
     """
-    c, s = math.cos(angle), math.sin(angle)
+    body, c, s = scratch.body, math.cos(angle), math.sin(angle)
     d = plus(times(c, first), times(s, second))
     for k in range(3):
         contacts.slip_direction[0, k] = d[k]
     n, r, b = axes[0], row_vector(contacts.arm, 0, 0), row_vector(contacts.constraint_error, 0, 0)
-    f = sliding_force_direction(body.mu, axes, 0, body, contacts)
+    f = sliding_force_direction(friction_of(contacts.slot[0], scratch), axes, 0, body, contacts)
     a = plus(times(1.0 / body.mass, f), qt.cross(apply_inverse_inertia(P, body.J, qt.cross(r, f)), r))
     a = plus(b, times(-qt.dot(n, b) / qt.dot(n, a), a))
     return c * qt.dot(second, a) - s * qt.dot(first, a), qt.dot(d, a)
@@ -151,16 +152,15 @@ def set_slip_onset_direction(P, scratch, contacts):
 
     Several contacts begin to slide in the directions that the search of the contact mode has found.
     """
-    body = scratch.body
-    if not has_one_sliding_contact(body, contacts) or not contacts.is_starting[0]:
+    if not has_one_sliding_contact(scratch, contacts) or not contacts.is_starting[0]:
         return
     axes = wall_axes(scratch.scene.walls, wall_of(contacts.slot[0], scratch.scene))
     n, u, first = axes[0], row_vector(contacts.velocity, 0, 0), row_vector(contacts.start_slip_direction, 0, 0)
     second, speed = qt.cross(n, first), math.sqrt(max(0.0, qt.dot(u, u) - qt.dot(n, u) * qt.dot(n, u)))
     angle = 0.0
     for _ in range(_ANGLE_NEWTON_STEPS):
-        across, along = _slip_accelerations(angle, first, second, axes, P, body, contacts)
-        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, body, contacts)
+        across, along = _slip_accelerations(angle, first, second, axes, P, scratch, contacts)
+        nudged, _ = _slip_accelerations(angle + _ANGLE_DIFFERENCE, first, second, axes, P, scratch, contacts)
         stiffness = (across - nudged) / _ANGLE_DIFFERENCE
         if not stiffness > 0.0:
             angle = 0.0
@@ -172,4 +172,4 @@ def set_slip_onset_direction(P, scratch, contacts):
         angle += step
         if abs(step) <= _ANGLE_TOLERANCE:
             break
-    _slip_accelerations(angle, first, second, axes, P, body, contacts)
+    _slip_accelerations(angle, first, second, axes, P, scratch, contacts)

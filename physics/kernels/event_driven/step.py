@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import if_given, inlined, kernel
+from physics.kernels.contact_law.materials import bind_materials
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.event_driven.acceleration_problem import read_resting_mode
 from physics.kernels.event_driven.chatter_control import (
@@ -297,6 +298,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, sc
             continue
         bind_fields(bodies.params, i, None, body)
         bind_laws(bodies.params, i, body)
+        bind_materials(bodies.params, i, body)
         y = read_state(bodies.state, i)
         for k in range(grid.steps * grid.substeps):
             new = _take_substep(y, h, contact, flight, scratch, motion, records, k * h)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined
+from physics.kernels.contact_law.materials import has_different_walls
 from physics.kernels.contact_law.restitution_energy import (
     IMPACT_ENERGY_ROUNDING,
     limit_rebound_energy,
@@ -68,7 +69,7 @@ def resolve_impacts(n, y, t, h, contact, offset_frame, records, scratch):
     solved = reject_energy_gain(n, contact, v, L, solved, R, scratch)
     v_new, L_new, residual, sweeps, method = apply_resistance_torques(n, contact, v, L, solved, R, scratch)
     report_solve(records.report, body.world, residual, sweeps, method, settings.tolerance)
-    if has_friction(contact) and body.restitution > 0.0:
+    if (has_friction(contact) or has_different_walls(scratch)) and body.restitution > 0.0:
         before, full = kinetic_energy(q, v, L, body, offset_frame), kinetic_energy(q, v_new, L_new, body, offset_frame)
         if full > before + IMPACT_ENERGY_ROUNDING * before:
             for k in range(3 * n):

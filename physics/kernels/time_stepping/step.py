@@ -34,6 +34,7 @@ from __future__ import annotations
 
 from physics.compiler.decorators import cold_kernel, if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import contact_stiffness, correct_spring_depth
+from physics.kernels.contact_law.materials import bind_materials
 from physics.kernels.contact_law.restitution_energy import lift_conserving_energy
 from physics.kernels.contact_solver.solve import rows_per_contact
 from physics.kernels.flight.free_flight import integrate_flight
@@ -318,6 +319,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
             continue
         bind_fields(bodies.params, i, flight.scheme, body)
         bind_laws(bodies.params, i, body)
+        bind_materials(bodies.params, i, body)
         y, clear = read_state(bodies.state, i), 0
         for k in range(end):
             set_clock(k * h, body)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physics.kernels.contact_law.materials import WallMaterials, material_members
 from physics.kernels.contact_solver.friction_pyramid import normal_lcp_sizes, pyramid_sizes
 from physics.kernels.forces.force_field_dispatch import Term, term_members
 from physics.kernels.state import contact_law_dispatch as contact_laws
@@ -31,15 +32,19 @@ def setting_fields() -> list[tuple]:
     ]
 
 
-def body_fields(terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()) -> list[tuple]:
+def body_fields(
+    terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), materials: WallMaterials | None = None
+) -> list[tuple]:
     """Fields, in the form of `numpy.dtype`, of a body's record: its parameters and loads (`body.bind_body`).
 
-    `terms` are the scene's force fields, `laws` its contact laws; they add members.
+    `terms` are the scene's force fields, `laws` its contact laws, and `materials` its coefficients at walls; they add
+    members.
     """
     f, i = np.float64, np.int64
     return [
         *term_members(terms),  # first: Numba takes a record for another one whose fields are the first of its own
         *contact_laws.law_members(laws),
+        *material_members(materials),
         ("relative_slop", f),  # gap within which a feature touches, in bounding radii; `bind_body` only reads this one
         ("i", i),
         ("world", i),
@@ -138,17 +143,21 @@ def _solver_fields(n: int) -> list[tuple]:
 
 
 def workspace_dtype(
-    wall_count: int, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = ()
+    wall_count: int,
+    features: int,
+    terms: tuple[Term, ...] = (),
+    laws: tuple[str, ...] = (),
+    materials: WallMaterials | None = None,
 ) -> np.dtype:
     """Record type of a workspace for bodies with `features` contact features (8 or 1) at `wall_count` walls.
 
-    `terms` are the scene's force fields, `laws` its contact laws.
+    `terms` are the scene's force fields, `laws` its contact laws, and `materials` its coefficients at walls.
     """
     n = max(wall_count * features, 1)
     groups = {
         "settings": setting_fields(),
         "scene": _scene_fields(wall_count),
-        "body": body_fields(terms, laws),
+        "body": body_fields(terms, laws, materials),
         "stage": _stage_fields(),
         "contacts": _contact_fields(max(wall_count, 1), n, laws),
         "solver": _solver_fields(n),
@@ -157,18 +166,26 @@ def workspace_dtype(
 
 
 def make_workspace(
-    walls: np.ndarray, features: int, terms: tuple[Term, ...] = (), laws: tuple[str, ...] = (), **settings: float
+    walls: np.ndarray,
+    features: int,
+    terms: tuple[Term, ...] = (),
+    laws: tuple[str, ...] = (),
+    materials: WallMaterials | None = None,
+    **settings: float,
 ) -> np.ndarray:
     """Make a workspace, an array of one record, for the given walls (walls, WALL_SIZE), features, fields and laws.
 
-    `settings` are numbers of `setting_fields`, or of a body's record such as `relative_slop`.
+    `materials` describes coefficients at walls. `settings` are numbers of `setting_fields`, or of a body's record such
+    as `relative_slop`.
     """
-    scratch = np.zeros(1, workspace_dtype(len(walls), features, terms, laws))
+    scratch = np.zeros(1, workspace_dtype(len(walls), features, terms, laws, materials))
     scene = scratch["scene"]
     scene["features"], scene["feature_bits"] = features, features.bit_length() - 1
     if len(walls):
         scene["walls"][0] = walls
     scratch["stage"]["residual_limit"] = np.inf
+    if materials is not None:
+        materials.write(scratch["body"])
     for name, value in settings.items():
         scratch["settings" if name in scratch.dtype["settings"].names else "body"][name] = value
     return scratch

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from physics.kernels.contact_law.materials import WallMaterials
 from physics.kernels.forces.force_field_dispatch import Term
 from physics.kernels.multibody.data.arrays import (
     BATCH_SIZE,
@@ -32,6 +33,7 @@ from physics.kernels.multibody.data.arrays import (
     LinearSystem,
     NarrowPhase,
     Newton,
+    PairMaterials,
     Sweeps,
     WorldSnapshots,
 )
@@ -98,6 +100,8 @@ def make_bodies_workspace(
     terms: tuple[Term, ...] = (),
     polyhedra: Sequence = (),
     *,
+    wall_materials: WallMaterials | None = None,
+    pair_materials: PairMaterials | None = None,
     meet=True,
     is_sequential=False,
     is_error_controlled=False,
@@ -116,6 +120,10 @@ def make_bodies_workspace(
         Force fields of the scene, which add fields to the record of a body.
     polyhedra : sequence
         The bodies as `make_hulls` takes them; empty if the world has no hulls.
+    wall_materials : WallMaterials, optional
+        Layout of the coefficients at walls; None: those of a body act at all of them.
+    pair_materials : PairMaterials, optional
+        Rules and exceptions for two bodies; None: the default rules.
     meet : bool
         True if bodies touch each other, False if they touch walls only.
     is_sequential : bool
@@ -130,7 +138,7 @@ def make_bodies_workspace(
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, relative_slop),
+        bodies=_make_bodies(bodies, terms, wall_materials, relative_slop),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -139,14 +147,17 @@ def make_bodies_workspace(
         system=_make_linear_system(bodies, block_capacity(bodies)),
         newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
         walls=walls.copy(),
+        materials=pair_materials,
         counts=np.zeros(5, np.int64),
         settings=_make_settings({**settings, **switches}),
     )
 
 
-def _make_bodies(bodies: int, terms: tuple[Term, ...], relative_slop: float) -> Bodies:
-    records = np.zeros(bodies, np.dtype(body_fields(terms)))
+def _make_bodies(bodies: int, terms: tuple[Term, ...], materials: WallMaterials | None, relative_slop: float) -> Bodies:
+    records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
+    if materials is not None:
+        materials.write(records)
     return Bodies(
         body=records,
         state=np.zeros((bodies, STATE_SIZE)),

@@ -206,6 +206,16 @@ class Newton(NamedTuple):
     lanes: np.ndarray  # (batches, LANES_SIZE) data of the contacts, four contacts side by side
 
 
+class PairMaterials(NamedTuple):
+    """Rules and exceptions for the coefficients of two bodies in contact. A pair a < b has the key a * bodies + b."""
+
+    rules: np.ndarray  # (2,) int, indices in `contact_law.materials.RULES` for friction and restitution
+    friction_pairs: np.ndarray  # (n,) int, keys of the pairs with a friction of their own, sorted
+    friction: np.ndarray  # (n,) Coulomb coefficients of these pairs
+    restitution_pairs: np.ndarray  # (m,) int, keys of the pairs with a restitution of their own, sorted
+    restitution: np.ndarray  # (m,) coefficients of restitution of these pairs
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -218,5 +228,6 @@ class BodiesWorkspace(NamedTuple):
     system: LinearSystem
     newton: Newton
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
+    materials: PairMaterials | None  # None: the default rules, and no exceptions
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import friction_at, restitution_at
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
+from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Room for feature numbers of one pair (two bodies, or a body and a wall) in the id of a contact. Pairs with a hull may
@@ -160,14 +162,12 @@ def relative_acceleration_bound(k, many):
 
 @inlined
 def _combine_materials(k, a, b, many):
-    """Write friction and restitution coefficients of contact k, between bodies a and b (b < 0: wall).
-
-    Two bodies have the geometric mean of their friction coefficients, and the larger restitution coefficient. A contact
-    with a wall has the coefficients of body a.
-    """
-    mu, e = many.bodies.body[a].mu, many.bodies.body[a].restitution
-    if b >= 0:
-        mu, e = math.sqrt(mu * many.bodies.body[b].mu), max(e, many.bodies.body[b].restitution)
+    """Write friction and restitution coefficients of contact k, between bodies a and b (b < 0: wall)."""
+    body = many.bodies.body[a]
+    if b < 0:
+        mu, e = friction_at(-1 - b, body), restitution_at(-1 - b, body)
+    else:
+        mu, e = pair_coefficients(a, b, many)
     many.contacts.mu[k], many.contacts.restitution[k] = mu, e
 
 

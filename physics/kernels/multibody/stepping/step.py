@@ -8,6 +8,7 @@ fall asleep (`data.sleeping`). Sleeping bodies only take part in the broad phase
 from __future__ import annotations
 
 from physics.compiler.decorators import inlined, kernel
+from physics.kernels.contact_law.materials import bind_wall_coefficients
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector
@@ -70,6 +71,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.body[b])
         many.bodies.inv_mass[b] = params[i, at.INV_MASS]
         bind_fields(params, i, switches.flight.scheme, many.bodies.body[b])
+        bind_wall_coefficients(params, i, many.bodies.body[b])
         write_state(many.bodies.state, b, read_state(state, i))
         many.bodies.touched[b] = 0
     lost = max(find_overloaded_body(many.bodies.body), find_nonfinite_body(many.bodies.state))

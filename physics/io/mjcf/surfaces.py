@@ -1,0 +1,71 @@
+"""Friction of a scene's bodies and walls as MJCF has it: a number per geom, of which a pair has the larger, and pairs.
+
+MuJoCo knows no other rule than the maximum. So the pairs for which a scene's rule gives another number are written as
+``<pair>`` elements, which replace the numbers of their geoms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from physics.compiler.decorators import plain_function
+from physics.kernels.contact_law.materials import RULES, combine
+from physics.scene.effects import Contact, Friction
+from physics.scene.materials import find_materials
+from physics.scene.scene import Scene
+
+
+class Frictions:
+    """Coefficients of friction of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its friction must have one coefficient; without friction all coefficients are 0.
+
+    Attributes
+    ----------
+    bodies, walls : list of float
+        Coefficient of each geom. A wall without one has the least of all bodies, which is never the larger one.
+    """
+
+    def __init__(self, scene: Scene):
+        friction = scene.effect(Friction)
+        usual = 0.0 if friction is None or friction.axis is not None else friction.along
+        is_own = friction is not None and friction.axis is None
+        self._scene, self._materials = scene, find_materials(scene)
+        self._pairs = self._materials.friction_pairs if is_own else {}
+        self._own = [wall.friction if is_own else None for wall in scene.walls]
+        self.bodies = [body.friction if is_own and body.friction is not None else usual for body in scene.bodies]
+        self.walls = [min(self.bodies) if own is None else own for own in self._own]
+
+    def of_pair(self, body: int, other: int) -> float:
+        """Coefficient of a body and another one, or of a body and wall -1 - `other`."""
+        own = self.bodies[body]
+        theirs = self.bodies[other] if other >= 0 else self._own[-1 - other]
+        if (body, other) in self._pairs:
+            return self._pairs[body, other]
+        if theirs is None:
+            return own
+        return float(plain_function(combine)(RULES.index(self._materials.rules[0]), own, theirs))
+
+    def exceptions(self) -> Iterator[tuple[int, int, float]]:
+        """Iterate over pairs that touch with another coefficient than the larger one of their geoms.
+
+        Items are (body, other body or -1 - wall, coefficient).
+        """
+        contact, count = self._scene.effect(Contact), len(self.bodies)
+        if contact is None:
+            return
+        for body in range(count):
+            others = [-1 - k for k in range(len(self.walls))]
+            others += range(body + 1, count if contact.between_bodies else 0)
+            for other in others:
+                mu = self.of_pair(body, other)
+                if mu != max(self.bodies[body], self.bodies[other] if other >= 0 else self.walls[-1 - other]):
+                    yield body, other, mu
+
+    @property
+    def is_none(self) -> bool:
+        """True if no geom has friction."""
+        return not any((*self.bodies, *self.walls))
