@@ -1,0 +1,84 @@
+"""Calls of query kernels, prepared once for a batch of worlds and made often."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from physics.kernels.parallel.work_stealing import make_ranges, make_taken_lists
+from physics.kernels.queries.query_scratch import QueriedBodies, make_query_scratch
+from physics.kernels.state.groups import WorkQueue
+from physics.parallel.bound_call import BoundCall, bound_alike
+from physics.scene.polyhedra import polyhedra
+from physics.world.batch import Batch
+
+# Places of the arguments of a query kernel: queue, worlds, bodies, hulls, scratch, then the question and its answer.
+_QUEUE, _INDICES, _QUESTION = 0, 1, 5
+
+
+class QueryCalls:
+    """Prepared calls of query kernels, with the scratch memory of each thread.
+
+    A query kernel takes (queue, indices, bodies, hulls, scratch, \\*question). It answers the question for each place k
+    of `indices` that it takes from the queue, where the world `indices[k]` is asked.
+
+    Parameters
+    ----------
+    world : Batch
+        Batch whose arrays are bound. The object holds no reference to the batch.
+    """
+
+    def __init__(self, world: Batch):
+        solids = polyhedra(world.scene.bodies)
+        self._bodies = QueriedBodies(world.state, world.params, world.shapes)
+        self._scratch = [
+            make_query_scratch(world.body_count, world.walls, solids) for _ in range(world.team.size)
+        ]
+        self._team, self._all = world.team, np.arange(world.worlds)
+        self._calls: dict[tuple[Callable, bool], list[BoundCall]] = {}
+        self._bound: dict[tuple[Callable, bool], tuple] = {}  # questions to which the calls are bound
+
+    def ask(self, kernel: Callable, indices: np.ndarray | None, *question) -> None:
+        """Answer a question about the worlds `indices`.
+
+        All worlds (None) are shared by the threads of the batch; the calling thread alone takes a choice of worlds. The
+        types of the `question` must be the same in each call with the same kernel.
+        """
+        is_all = indices is None
+        if indices is None:
+            queues, places = self._team.queues, self._all
+        else:
+            queues, places = [_queue_of(len(indices))], indices
+        key, same = (kernel, is_all), _contents(question)
+        if key not in self._calls:
+            self._calls[key] = [self._bind(kernel, queue, places, k, question) for k, queue in enumerate(queues)]
+        elif self._bound[key] != same:
+            for call in self._calls[key]:
+                for k, argument in enumerate(question, _QUESTION):
+                    call.put(k, argument)
+        self._bound[key] = same
+        calls = self._calls[key]
+        if is_all:
+            self._team.run(calls)
+        elif len(places):
+            calls[0].put(_QUEUE, queues[0])
+            calls[0].put(_INDICES, places)
+            calls[0]()
+
+    def _bind(self, kernel: Callable, queue: WorkQueue, places: np.ndarray, k: int, question: tuple) -> BoundCall:
+        scratch = self._scratch[k]
+        hulls = scratch.narrowphase.hulls
+        return bound_alike(hulls is None, kernel, queue, places, self._bodies, hulls, scratch, *question)
+
+
+def _queue_of(count: int) -> WorkQueue:
+    """Queue of `count` places, for one thread."""
+    return WorkQueue(make_ranges(1, count, count), make_taken_lists(1, count)[0])
+
+
+def _contents(value):
+    """Numbers of a question, and address and shape of each of its arrays: equal ones can share a bound call."""
+    if isinstance(value, tuple):
+        return tuple(map(_contents, value))
+    return (value.ctypes.data, value.shape) if isinstance(value, np.ndarray) else value
