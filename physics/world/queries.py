@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,13 +69,13 @@ class Querying(Batch):
         """
         indices = None if worlds is None else choice.world_indices(worlds, self.worlds, once=False)
         asked = self.worlds if indices is None else len(indices)
-        start, way = _vectors(origins, asked, "origins"), _vectors(directions, asked, "directions")
+        start, way = _vectors(origins, asked, "origins"), _vectors(directions, asked, "directions", may_vanish=False)
         count = max(start.shape[1], way.shape[1])
-        for array, field in ((start, "origins"), (way, "directions")):
-            if array.shape[1] not in (1, count):
-                raise ValueError(f"{field} has {array.shape[1]} rays; allowed are {count}, as many as the other argument has")
+        for table, field in ((start, "origins"), (way, "directions")):
+            if table.shape[1] not in (1, count):
+                raise ValueError(f"{field} has {table.shape[1]} rays; allowed are {count}, as in the other argument, and 1")
         rays = Rays(
-            _checked(start, "origins", True), _checked(way, "directions", False), _row_steps(start), _row_steps(way),
+            start.reshape(-1, 3), way.reshape(-1, 3), _row_steps(start), _row_steps(way),
             count, _distance(max_distance),
             NOTHING if exclude is None else validation.index(exclude, self.body_count, "exclude"),
         )  # fmt: skip
@@ -91,31 +90,29 @@ class Querying(Batch):
         self._queries.ask(kernel, indices, *question)
 
 
-def _vectors(value: ArrayLike, worlds: int, field: str) -> NDArray[np.float64]:
-    """Convert vectors for the rays of `worlds` worlds to an array (worlds or 1, rays or 1, 3)."""
-    array = validation.floats(value, field, f"are numbers in shape ({worlds}, rays, 3), (rays, 3) or (3,)")
-    if array.ndim in (1, 2, 3) and array.shape[-1] == 3:
-        table: Any = np.ascontiguousarray(array.reshape((1,) * (3 - array.ndim) + array.shape))
-        if table.shape[0] in (1, worlds):
-            return table
-    raise ValueError(f"{field} has shape {array.shape}; allowed is shape ({worlds}, rays, 3), (rays, 3) or (3,)")
+def _vectors(value: ArrayLike, worlds: int, field: str, may_vanish: bool = True) -> NDArray[np.float64]:
+    """Convert vectors for the rays of `worlds` worlds to a contiguous array (worlds or 1, rays or 1, 3).
+
+    The first vector that is not finite, or has zeros only unless it `may_vanish`, is named in an error.
+    """
+    shapes = f"shape ({worlds}, rays, 3), (rays, 3) or (3,)"
+    array = validation.floats(value, field, f"are numbers in {shapes}")
+    if not 1 <= array.ndim <= 3 or array.shape[-1] != 3 or (array.ndim == 3 and array.shape[0] != worlds):
+        raise ValueError(f"{field} has shape {array.shape}; allowed is {shapes}")
+    table = np.ascontiguousarray(array.reshape((1,) * (3 - array.ndim) + array.shape))
+    bad = first_bad_row(table.reshape(-1, 3), may_vanish)
+    if bad >= 0:
+        place = np.unravel_index(bad, array.shape[:-1])
+        index = f"[{', '.join(map(str, map(int, place)))}]" if place else ""
+        allowed = "finite numbers" if may_vanish else "finite numbers that are not all 0"
+        raise ValueError(f"{field}{index} is {shown(array[place])}; allowed are {allowed}")
+    return table
 
 
 def _row_steps(table: np.ndarray) -> tuple[int, int]:
     """Steps in rows from a world to the next, and from a ray to the next; 0 where all have the same vector."""
     worlds, rays, _ = table.shape
     return (rays if worlds > 1 else 0), (1 if rays > 1 else 0)
-
-
-def _checked(table: np.ndarray, field: str, may_vanish: bool) -> np.ndarray:
-    """Return the vectors of a `table` as rows (n, 3); the first that is not allowed is named in an error."""
-    rows = table.reshape(-1, 3)
-    bad = first_bad_row(rows, may_vanish)
-    if bad >= 0:
-        world, ray = divmod(int(bad), table.shape[1])
-        allowed = "finite numbers" if may_vanish else "finite numbers that are not all 0"
-        raise ValueError(f"{field}[{world}, {ray}] is {shown(rows[bad])}; allowed are {allowed}")
-    return rows
 
 
 def _distance(value: float) -> float:
