@@ -26,6 +26,7 @@ class Querying(Batch):
         origins: ArrayLike,
         directions: ArrayLike,
         max_distance: float = math.inf,
+        carrier: int | None = None,
         exclude: int | None = None,
         worlds: ArrayLike | None = None,
         out: RayHits | None = None,
@@ -42,8 +43,10 @@ class Querying(Batch):
             same for all worlds; (3,) and (n, 1, 3): the same for all rays.
         max_distance : float
             Largest distance of a hit [m].
+        carrier : int, optional
+            Index of a body that carries the sensor: origins and directions are in its frame, from its centre of mass.
         exclude : int, optional
-            Index of a body that rays pass through, such as the one that carries the sensor.
+            Index of a body that rays pass through. None: the carrier, if there is one.
         worlds : (n,) int array_like or (worlds,) mask, optional
             Indices of the worlds to ask, in this order; None: all.
         out : RayHits, optional
@@ -76,13 +79,16 @@ class Querying(Batch):
                 raise ValueError(f"{field} has {table.shape[1]} rays; allowed are {count}, as in the other argument, and 1")
         rays = Rays(
             start.reshape(-1, 3), way.reshape(-1, 3), _row_steps(start), _row_steps(way),
-            count, _distance(max_distance),
-            NOTHING if exclude is None else validation.index(exclude, self.body_count, "exclude"),
+            count, _distance(max_distance), self._code(carrier, "carrier"),
+            self._code(carrier if exclude is None else exclude, "exclude"),
         )  # fmt: skip
         hits = no_hits(asked, count) if out is None else _result(out, asked, count)
         rows = Hits(hits.distance.reshape(-1), hits.hit.reshape(-1), hits.normal.reshape(-1, 3))
         self._ask(cast_rays, indices, rays, rows)
         return hits
+
+    def _code(self, body: int | None, field: str) -> int:
+        return NOTHING if body is None else validation.index(body, self.body_count, field)
 
     def _ask(self, kernel, indices: np.ndarray | None, *question) -> None:
         if self._queries is None:

@@ -350,6 +350,28 @@ def test_sizes_of_each_world_count(rng):
     assert world.cast_rays((-5, 0, 0), (1, 0, 0)).distance.ravel().tolist() == [4.0, 4.5]
 
 
+def test_rays_of_a_carrier_turn_with_it_and_pass_through_it(rng):
+    """Directions are normalised before they turn, so that rounding is that of a rotation."""
+    world = batch_of()
+    origins, directions = rays_of(rng, 30)
+    body = 4
+    R, x = rotation_matrices(world.quat[:, body]), world.pos[:, body]
+    turned = x[:, None] + np.einsum("wij,rj->wri", R, 0.1 * origins), np.einsum("wij,rj->wri", R, directions)
+    expected = world.cast_rays(*turned, exclude=body)
+    hits = world.cast_rays(0.1 * origins, directions, carrier=body)
+    assert (hits.hit == expected.hit).mean() > 0.99
+    alike = hits.hit == expected.hit
+    n, d = expected.normal[alike], turned[1][alike] / np.linalg.norm(turned[1][alike], axis=1)[:, None]
+    cosine = np.abs(np.einsum("ri,ri->r", n, d))
+    gone = expected.hit[alike] == NOTHING
+    off = np.abs(np.where(gone, 0, hits.distance[alike]) - np.where(gone, 0, expected.distance[alike]))
+    assert (off * cosine <= 4 * ROUNDING).all()
+    assert not (hits.hit == body).any()
+    other = world.cast_rays(0.1 * origins, directions, carrier=body, exclude=0)
+    assert (other.hit == body).any()
+    assert not (other.hit == 0).any()
+
+
 def test_a_copied_world_answers_alike(rng):
     world = batch_of(2)
     origins, directions = rays_of(rng, 10)
@@ -392,6 +414,7 @@ def test_a_world_that_another_thread_uses_is_refused():
         ({"max_distance": -1}, r"max_distance is -1.0; allowed are numbers of at least 0, and inf"),
         ({"max_distance": np.nan}, r"max_distance is nan; allowed are numbers of at least 0, and inf"),
         ({"exclude": 1}, r"exclude is 1; allowed are indices from 0 to 0"),
+        ({"carrier": -1}, r"carrier is -1; allowed are indices from 0 to 0"),
         ({"worlds": [2]}, r"worlds is \[2\]; allowed are indices from 0 to 1"),
         ({"out": 3}, r"out is 3; allowed is None or RayHits of an earlier call"),
     ],

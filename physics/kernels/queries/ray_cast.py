@@ -9,7 +9,7 @@ import numpy as np
 
 from physics.compiler.decorators import entry_kernel, if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.vector import minus, row_vector, times
+from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
 from physics.kernels.multibody.data.hull_tables import FIRST_FACE, LAST_FACE
 from physics.kernels.parallel.work_stealing import for_each_world
@@ -23,7 +23,7 @@ from physics.kernels.queries.ray_shapes import (
     ray_polyhedron,
     ray_sphere,
 )
-from physics.kernels.state.layout import BLOCK, HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
+from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
 # Code of neither a body nor a wall: of a ray that hits nothing, and of no excluded body.
 NOTHING = -(2**31)
@@ -41,6 +41,7 @@ class Rays(NamedTuple):
     direction_rows: tuple[int, int]  # (world_rows, ray_rows) of `directions`
     count: int  # rays of a world
     max_distance: float  # [m]
+    carrier: int  # body in whose frame origins and directions are given, from its centre of mass; NOTHING: world frame
     exclude: int  # body that rays pass through; NOTHING: none
 
 
@@ -126,9 +127,15 @@ def cast_rays_of_world(k, indices, bodies, hulls, scratch, rays, hits):
     """Cast all rays of the k-th of the worlds `indices`; write `hits`."""
     pose_world(indices[k], bodies, scratch)
     build_tree(scratch)
+    x, R = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+    if rays.carrier >= 0:
+        x = row_vector(bodies.state, indices[k] * bodies.shapes.shape[0] + rays.carrier, POS)
+        R = row_matrix(scratch.bodies.rotation, rays.carrier)
     for r in range(rays.count):
         o = row_vector(rays.origins, k * rays.origin_rows[0] + r * rays.origin_rows[1], 0)
         d = _unit(row_vector(rays.directions, k * rays.direction_rows[0] + r * rays.direction_rows[1], 0))
+        if rays.carrier >= 0:
+            o, d = plus(x, qt.matvec(R, o)), qt.matvec(R, d)
         place = k * rays.count + r
         hits.distance[place], hits.hit[place], normal = cast_ray(
             o, d, rays.max_distance, rays.exclude, hulls, scratch
