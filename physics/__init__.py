@@ -34,6 +34,7 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.run import frontier, ladder
 from physics.work_precision.truth import Truth
 from physics.world.impacts import Impacts
+from physics.world.nearest import Nearest
 from physics.world.ray_hits import RayHits
 from physics.world.report import Solver, Status, StepReport
 from physics.world.rollout import Rollout, rollout
@@ -67,6 +68,7 @@ __all__ = [
     "Hull",
     "Impacts",
     "Magnus",
+    "Nearest",
     "Push",
     "RayHits",
     "Recorder",

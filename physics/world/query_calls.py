@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from physics.kernels.parallel.work_stealing import make_ranges, make_taken_lists
-from physics.kernels.queries.query_scratch import QueriedBodies, make_query_scratch
+from physics.kernels.queries.query_scratch import QueriedBodies, QueryScratch, make_query_scratch
 from physics.kernels.state.groups import WorkQueue
 from physics.parallel.bound_call import BoundCall, bound_alike
-from physics.scene.polyhedra import polyhedra
+from physics.scene.polyhedra import every_polyhedron
 from physics.world.batch import Batch
 
-# Places of the arguments of a query kernel: queue, worlds, bodies, hulls, scratch, then the question and its answer.
-_QUEUE, _INDICES, _QUESTION = 0, 1, 5
+# Places of the arguments of a query kernel: queue, worlds, bodies, scratch, then the question and its answer.
+_QUEUE, _INDICES, _QUESTION = 0, 1, 4
 
 
 class QueryCalls:
     """Prepared calls of query kernels, with the scratch memory of each thread.
 
-    A query kernel takes (queue, indices, bodies, hulls, scratch, \\*question). It answers the question for each place k
+    A query kernel takes (queue, indices, bodies, scratch, \\*question). It answers the question for each place k
     of `indices` that it takes from the queue, where the world `indices[k]` is asked.
 
     Parameters
@@ -30,29 +31,31 @@ class QueryCalls:
     """
 
     def __init__(self, world: Batch):
-        solids = polyhedra(world.scene.bodies)
         self._bodies = QueriedBodies(world.state, world.params, world.shapes)
-        self._scratch = [
-            make_query_scratch(world.body_count, world.walls, solids) for _ in range(world.team.size)
-        ]
+        self._solids, self._walls = every_polyhedron(world.scene.bodies), world.walls
         self._team, self._all = world.team, np.arange(world.worlds)
-        self._calls: dict[tuple[Callable, bool], list[BoundCall]] = {}
-        self._bound: dict[tuple[Callable, bool], tuple] = {}  # questions to which the calls are bound
+        self._scratch: dict[int, tuple[Any, list[QueryScratch]]] = {}
+        self._calls: dict[tuple, list[BoundCall]] = {}
+        self._bound: dict[tuple, tuple] = {}  # questions to which the calls are bound
 
-    def ask(self, kernel: Callable, indices: np.ndarray | None, *question) -> None:
+    def ask(self, kernel: Callable, indices: np.ndarray | None, *question, solid: Any = None) -> None:
         """Answer a question about the worlds `indices`.
 
         All worlds (None) are shared by the threads of the batch; the calling thread alone takes a choice of worlds. The
-        types of the `question` must be the same in each call with the same kernel.
+        types of the `question` must be the same in each call with the same kernel. `solid` is the polyhedron of a shape
+        in the question, None for a round shape.
         """
         is_all = indices is None
         if indices is None:
             queues, places = self._team.queues, self._all
         else:
             queues, places = [_queue_of(len(indices))], indices
-        key, same = (kernel, is_all), _contents(question)
+        key, same = (kernel, is_all, id(solid)), _contents(question)
         if key not in self._calls:
-            self._calls[key] = [self._bind(kernel, queue, places, k, question) for k, queue in enumerate(queues)]
+            self._calls[key] = [
+                bound_alike(None, kernel, queue, places, self._bodies, scratch, *question)
+                for queue, scratch in zip(queues, self._scratch_for(solid))
+            ]
         elif self._bound[key] != same:
             for call in self._calls[key]:
                 for k, argument in enumerate(question, _QUESTION):
@@ -66,10 +69,13 @@ class QueryCalls:
             calls[0].put(_INDICES, places)
             calls[0]()
 
-    def _bind(self, kernel: Callable, queue: WorkQueue, places: np.ndarray, k: int, question: tuple) -> BoundCall:
-        scratch = self._scratch[k]
-        hulls = scratch.narrowphase.hulls
-        return bound_alike(hulls is None, kernel, queue, places, self._bodies, hulls, scratch, *question)
+    def _scratch_for(self, solid: Any) -> list[QueryScratch]:
+        """Scratch memory of each thread, with room for a shape besides the bodies; the solid is kept for its `id`."""
+        if id(solid) not in self._scratch:
+            bodies, solids = len(self._solids), [*self._solids, solid]
+            made = [make_query_scratch(bodies, self._walls, solids) for _ in range(self._team.size)]
+            self._scratch[id(solid)] = solid, made
+        return self._scratch[id(solid)][1]
 
 
 def _queue_of(count: int) -> WorkQueue:

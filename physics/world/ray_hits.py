@@ -35,6 +35,4 @@ class RayHits(NamedTuple):
         return f"worlds={worlds}", f"rays={rays}", f"hits={np.isfinite(self.distance).sum()}"
 
 
-def no_hits(worlds: int, rays: int) -> RayHits:
-    """Make `RayHits` for `worlds` worlds and `rays` rays of each, to be written by a ray cast."""
-    return RayHits(np.empty((worlds, rays)), np.empty((worlds, rays), np.int64), np.empty((worlds, rays, 3)))
+RayHits.INTEGERS = ("hit",)  # type: ignore[attr-defined]

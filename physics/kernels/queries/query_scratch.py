@@ -6,6 +6,7 @@ names. So functions of the narrow phase take it as their argument `many`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -21,9 +22,9 @@ from physics.kernels.state import layout as at
 
 
 class PosedBodies(NamedTuple):
-    """Bodies of a world in their present poses, a row for each body."""
+    """Bodies of a world in their present poses, a row for each body, and one for a shape that is compared with them."""
 
-    body: np.ndarray  # (bodies,) records of shape code, half edges or semi-axes [m], and a slop of 0
+    body: np.ndarray  # (bodies,) records: shape code, half edges or semi-axes [m], bounding radius about `center` [m]
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
     rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
 
@@ -32,8 +33,10 @@ class PairScratch(NamedTuple):
     """Scratch of the narrow phase for one pair of bodies; `multibody.data.arrays.NarrowPhase` explains the members."""
 
     simplex: np.ndarray
-    relative_axes: np.ndarray
-    hulls: Hulls | None  # None in a world without hulls
+    corners: np.ndarray  # (4, 3) corners of the simplex before it was reduced
+    on_first: np.ndarray  # (4, 3) points of the first body that belong to the corners of the simplex
+    points: np.ndarray  # (4, 3) the same before the simplex was reduced
+    hulls: Hulls  # of blocks, too
     face_offsets: np.ndarray  # (faces,) offsets of the hulls' faces from their centres, body frame [m]
 
 
@@ -64,14 +67,15 @@ def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence) -> Q
     walls : (walls, WALL_SIZE) float64
         Table of the walls.
     polyhedra : sequence
-        The bodies as `hull_tables.make_hulls` takes them; empty if the world has no hulls.
+        Polyhedron of each body as `hull_tables.make_hulls` takes them, of blocks, too; None for a round body. Further
+        ones are those of shapes that are no bodies of the world.
     """
-    records = np.zeros(bodies, np.dtype([("shape", np.int64), ("dims", np.float64, (3,)), ("slop", np.float64)]))
-    hulls = make_hulls(polyhedra) if len(polyhedra) else None
-    offsets = np.zeros(0) if hulls is None else _face_offsets(hulls)
+    rows = len(polyhedra)
+    records = np.zeros(rows, np.dtype([("shape", np.int64), ("dims", np.float64, (3,)), ("radius", np.float64)]))
+    hulls = make_hulls(polyhedra)
     return QueryScratch(
-        PosedBodies(records, np.zeros((bodies, 3)), np.zeros((bodies, 9))),
-        PairScratch(np.zeros((4, 3)), np.zeros((4, 3, 3)), hulls, offsets),
+        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9))),
+        PairScratch(*(np.zeros((4, 3)) for _ in range(4)), hulls, _face_offsets(hulls)),
         make_box_tree(bodies),
         walls.copy(),
     )
@@ -88,6 +92,16 @@ def _face_offsets(hulls: Hulls) -> np.ndarray:
 
 
 @inlined
+def bounding_radius(shape, dims, hull_radius):
+    """Radius of the sphere about the geometric centre of a body that holds it [m]; `hull_radius` is that of a hull."""
+    if shape == at.BLOCK:
+        return math.sqrt(dims[0] * dims[0] + dims[1] * dims[1] + dims[2] * dims[2])
+    if shape == at.HULL:
+        return hull_radius
+    return max(dims[0], dims[1], dims[2])
+
+
+@inlined
 def pose_body(b, i, shape, bodies, scratch):
     """Write shape and pose of the body in row i of the batch into row b of the scratch."""
     q = (bodies.state[i, at.QUAT], bodies.state[i, at.QUAT + 1], bodies.state[i, at.QUAT + 2])
@@ -96,6 +110,7 @@ def pose_body(b, i, shape, bodies, scratch):
     body.shape = shape
     for c in range(3):
         body.dims[c] = bodies.params[i, at.DIMENSIONS + c]
+    body.radius = bounding_radius(shape, body.dims, bodies.params[i, at.RADIUS])
     for c in range(9):
         posed.rotation[b, c] = R[c]
     arm = qt.matvec(R, row_vector(bodies.params, i, at.CENTER))

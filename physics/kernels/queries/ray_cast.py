@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compiler.decorators import entry_kernel, if_given, inlined, kernel
+from physics.compiler.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
@@ -53,20 +53,9 @@ class Hits(NamedTuple):
     normal: np.ndarray  # (rows, 3) unit normal out of the body or wall, world frame; 0: nothing
 
 
-def _miss(b, o, d, hulls, scratch):
-    return MISS
-
-
-@if_given("hulls", _miss)
-def _ray_hull(b, o, d, hulls, scratch):
-    """First point of a ray on the hull b, in its frame: (t, normal)."""
-    first, last = hulls.of[b, FIRST_FACE], hulls.of[b, LAST_FACE]
-    return ray_polyhedron(o, d, first, last, hulls.normals, scratch.narrowphase.face_offsets)
-
-
 @kernel
-def _ray_body(b, o, d, hulls, scratch):
-    """First point of a ray on body b: (t [m], normal, world frame); `hulls` is None in a world without hulls."""
+def _ray_body(b, o, d, scratch):
+    """First point of a ray on body b: (t [m], normal, world frame)."""
     arm, R = minus(o, row_vector(scratch.bodies.center, b, 0)), row_matrix(scratch.bodies.rotation, b)
     shape, dims = scratch.bodies.body[b].shape, scratch.bodies.body[b].dims
     if shape == SPHERE:
@@ -75,7 +64,8 @@ def _ray_body(b, o, d, hulls, scratch):
     if shape == BLOCK:
         t, n = ray_block(arm, way, dims)
     elif shape == HULL:
-        t, n = _ray_hull(b, arm, way, hulls, scratch)
+        hulls, offsets = scratch.narrowphase.hulls, scratch.narrowphase.face_offsets
+        t, n = ray_polyhedron(arm, way, hulls.of[b, FIRST_FACE], hulls.of[b, LAST_FACE], hulls.normals, offsets)
     else:
         t, n = ray_ellipsoid(arm, way, dims)
     return t, qt.matvec(R, n)
@@ -93,7 +83,7 @@ def _nearest_wall(o, d, best, scratch):
 
 
 @kernel
-def cast_ray(o, d, farthest, exclude, hulls, scratch):
+def cast_ray(o, d, farthest, exclude, scratch):
     """Nearest body or wall that a ray meets within the distance `farthest`: (t [m], code, normal).
 
     Of bodies at equal distances the first counts, and a body counts before a wall.
@@ -105,7 +95,7 @@ def cast_ray(o, d, farthest, exclude, hulls, scratch):
     for k in range(first, end):
         b = tree.item[k] - rows
         if b != exclude and not tree.distance[k] > best:
-            t, n = _ray_body(b, o, d, hulls, scratch)
+            t, n = _ray_body(b, o, d, scratch)
             if t < best or (t == best and t < math.inf and (code < 0 or b < code)):
                 best, code, normal = t, b, n
     return (math.inf if code == NOTHING else best), code, normal
@@ -123,7 +113,7 @@ def _unit(a):
 
 
 @kernel
-def cast_rays_of_world(k, indices, bodies, hulls, scratch, rays, hits):
+def cast_rays_of_world(k, indices, bodies, scratch, rays, hits):
     """Cast all rays of the k-th of the worlds `indices`; write `hits`."""
     pose_world(indices[k], bodies, scratch)
     build_tree(scratch)
@@ -138,7 +128,7 @@ def cast_rays_of_world(k, indices, bodies, hulls, scratch, rays, hits):
             o, d = plus(x, qt.matvec(R, o)), qt.matvec(R, d)
         place = k * rays.count + r
         hits.distance[place], hits.hit[place], normal = cast_ray(
-            o, d, rays.max_distance, rays.exclude, hulls, scratch
+            o, d, rays.max_distance, rays.exclude, scratch
         )
         put_vector(hits.normal, place, 0, normal)
 
@@ -147,13 +137,9 @@ _for_each = for_each_world(cast_rays_of_world)
 
 
 @kernel
-def cast_rays(queue, indices, bodies, hulls, scratch, rays, hits):
-    """Cast the rays of all places k of `indices` that the calling thread can take from `queue`.
-
-    `hulls` are those of the scratch, or None; they are an argument of their own so that the compiler removes what a
-    world without hulls does not need.
-    """
-    _for_each(queue, (indices, bodies, hulls, scratch, rays, hits))
+def cast_rays(queue, indices, bodies, scratch, rays, hits):
+    """Cast the rays of all places k of `indices` that the calling thread can take from `queue`."""
+    _for_each(queue, (indices, bodies, scratch, rays, hits))
 
 
 @entry_kernel
