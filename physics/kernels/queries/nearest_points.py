@@ -15,7 +15,6 @@ from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix
 from physics.kernels.multibody.data.hull_tables import FIRST_EDGE, FIRST_FACE, LAST_EDGE, LAST_FACE
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
-    block_support_point,
     center_direction,
     ellipsoid_matrix,
     ellipsoid_support_point,
@@ -57,7 +56,7 @@ def nearest_on_body(b, x, scratch):
         return distance, n, plus(center, y)
     way, D = times(-1.0, arm), ellipsoid_matrix(R, dims)
     n, distance = max_separation_direction(D, True, _NO_MATRIX, _POINT, way, center_direction(way))
-    return distance, times(-1.0, n), minus(center, ellipsoid_support_point(D, n)[1])
+    return distance, times(-1.0, n), add_scaled(x, distance, n)
 
 
 @kernel
@@ -70,9 +69,8 @@ def _nearest_of_ellipsoid(a, b, scratch):
     is_block = scratch.bodies.body[b].shape == BLOCK
     start = nearest_on_block(way, dims)[1] if is_block else center_direction(way)
     n, gap = max_separation_direction(A, is_block, B, dims, way, start)
-    p = minus(way, ellipsoid_support_point(A, n)[1])
-    q = block_support_point(dims, n, p) if is_block else ellipsoid_support_point(B, n)[1]
-    return gap, qt.matvec(R, n), plus(x, qt.matvec(R, p)), plus(x, qt.matvec(R, q))
+    n, p = qt.matvec(R, n), plus(x, qt.matvec(R, minus(way, ellipsoid_support_point(A, n)[1])))
+    return gap, n, p, add_scaled(p, -gap, n)
 
 
 @kernel
