@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from benchmarks import rays
+from benchmarks import machine, rays
 
 
 @pytest.mark.parametrize("name", ["lidar", "scattered"])
@@ -38,6 +38,16 @@ def test_another_hit_and_another_distance_are_noticed():
     found = rays.differences(ours, theirs)
     assert found["other_hits"] == 1
     assert found["distance"] == pytest.approx(1e-6, rel=1e-3)
+
+
+def test_the_page_has_the_numbers_of_the_kept_result():
+    kept = json.loads((machine.RESULTS / "rays.json").read_text())
+    page = (machine.RESULTS.parents[1] / "docs" / "queries.md").read_text(encoding="utf-8")
+    for row in kept["rows"]:
+        ours, peer, ratio = (row[name]["median"] for name in ("ours", "peer", "ratio"))
+        assert f"| {ours / 1e6:.2f} | {peer / 1e6:.2f} | {ratio:.1f} |" in page
+        assert row["notes"]["distance"] <= rays.AGREEMENT
+        assert row["notes"]["other_hits"] == 0
 
 
 @pytest.mark.exhaustive

@@ -58,7 +58,7 @@ Nearest.INTEGERS = ("other",)  # type: ignore[attr-defined]
 
 
 def nearest_result(out: Nearest | None, worlds: int, rows: int) -> tuple[Nearest, Found]:
-    """Return a result with `rows` rows for each world, `out` if it is given, and the same arrays as kernels take them."""
+    """Return a result with `rows` rows for each world, `out` if it is given, and its arrays as kernels take them."""
     shape, vectors = (worlds, rows), (worlds, rows, 3)
     shapes = {"gap": shape, "other": shape, "normal": vectors, "point": vectors, "other_point": vectors}
     found = result(out, Nearest, shapes)

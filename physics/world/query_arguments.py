@@ -13,7 +13,9 @@ from physics.kernels.queries.ray_cast import first_bad_row
 from physics.summary import shown
 
 
-def vectors(value: ArrayLike, worlds: int, field: str, each: str = "rays", may_vanish: bool = True) -> NDArray[np.float64]:
+def vectors(
+    value: ArrayLike, worlds: int, field: str, each: str = "rays", may_vanish: bool = True
+) -> NDArray[np.float64]:
     """Convert vectors for each `each`, such as rays, of `worlds` worlds to an array (worlds or 1, rays or 1, 3).
 
     The first vector that is not finite, or has zeros only unless it `may_vanish`, is named in an error.
@@ -45,11 +47,14 @@ def common_count(tables: Mapping[str, np.ndarray], each: str) -> int:
         count = 0
     for field, table in tables.items():
         if table.shape[1] not in (1, count):
-            raise ValueError(f"{field} has {table.shape[1]} {each}; allowed are {count}, as in the other argument, and 1")
+            raise ValueError(
+                f"{field} has {table.shape[1]} {each}; allowed are {count}, as in the other argument, and 1"
+            )
     return count
 
 
 def largest_distance(value: float) -> float:
+    """Check a largest distance [m], which may be inf."""
     if type(value) is float and value >= 0.0:
         return value
     array = validation.shaped(value, (), "max_distance")

@@ -21,7 +21,7 @@ _QUEUE, _INDICES, _QUESTION = 0, 1, 4
 class QueryCalls:
     """Prepared calls of query kernels, with the scratch memory of each thread.
 
-    A query kernel takes (queue, indices, bodies, scratch, \\*question). It answers the question for each place k
+    A query kernel takes (queue, indices, bodies, scratch) and a question. It answers the question for each place k
     of `indices` that it takes from the queue, where the world `indices[k]` is asked.
 
     Parameters

@@ -409,7 +409,18 @@ class World(Touching, Querying):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
         flags = ("is_torn", "telling", "is_plain", "is_bound")
-        for name in ("plan", "team", "scratch", "motions", "_queries", "_wrench", "_calls", "_bound_for", *flags, *views):
+        for name in (
+            "plan",
+            "team",
+            "scratch",
+            "motions",
+            "_queries",
+            "_wrench",
+            "_calls",
+            "_bound_for",
+            *flags,
+            *views,
+        ):
             del kept[name]
         for name in ("is_free", "_user"):  # of `Exclusive`: a copy is free
             kept.pop(name, None)

@@ -1,4 +1,4 @@
-"""Nearest points and overlap: closed forms, all features of polyhedra, all directions of round bodies, the same bits."""
+"""Nearest points and overlap: closed forms, all features of polyhedra, all directions of round bodies, equal bits."""
 
 from __future__ import annotations
 
@@ -104,7 +104,9 @@ def test_walls_are_reached_by_the_lowest_point():
 
 
 def test_a_point_and_a_shape_find_the_nearest_of_all():
-    world = world_of(CUBE, at(CUBE, (6, 0, 0)), physics.Sphere(1.0, 1.0, pos=(0, 6, 0)), walls=[physics.HalfSpace((0, 1, 0), -3.0)])
+    world = world_of(
+        CUBE, at(CUBE, (6, 0, 0)), physics.Sphere(1.0, 1.0, pos=(0, 6, 0)), walls=[physics.HalfSpace((0, 1, 0), -3.0)]
+    )
     poses = [(3.2, 0, 0), (2.8, 0, 0), (0, 4, 0), (0, -2.5, 0), (0.5, 0, 0)]
     found = world.nearest_to(None, poses)
     assert found.other[0].tolist() == [1, 0, 2, -1, 0]
@@ -134,7 +136,7 @@ def test_what_is_farther_than_the_largest_distance_is_left_out():
     assert not found.point[0, 1].any()
 
 
-# --- against slow oracles ----------------------------------------------------------------------------------------------
+# --- against slow oracles --------------------------------------------------------------------------------------------
 
 
 def polyhedron(rng):
@@ -147,7 +149,10 @@ def polyhedron(rng):
 def test_distances_of_polyhedra_are_those_of_all_their_features(seed, log_gap):
     """Bodies are put about 10^log_gap apart, along the direction that separated them before."""
     rng = np.random.default_rng(seed)
-    a, b = at(polyhedron(rng), 4 * rng.standard_normal(3), quaternion(rng)), at(polyhedron(rng), (0, 0, 0), quaternion(rng))
+    a, b = (
+        at(polyhedron(rng), 4 * rng.standard_normal(3), quaternion(rng)),
+        at(polyhedron(rng), (0, 0, 0), quaternion(rng)),
+    )
     first = gap_of(a, b)
     if first.gap[0, 0] <= 0:
         return

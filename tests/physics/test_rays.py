@@ -25,8 +25,8 @@ EXTENT = 6.0  # of the scenes and of the origins of rays [m]
 REACH = 40.0  # beyond any body from any origin [m]
 
 # Rounding of a hit. Coordinates up to L = 10 m enter with errors of EPS L; about ten operations on each (rotation into
-# the frame of the body, division by half edges of at least 0.2 m and back) may add up. Along the ray an error across the
-# surface counts by 1/|n·d|.
+# the frame of the body, division by half edges of at least 0.2 m and back) may add up. Along the ray an error across
+# the surface counts by 1/|n·d|.
 ROUNDING = 100 * EPS * 10
 
 
@@ -167,7 +167,7 @@ def test_directions_may_have_any_length(size):
     assert one(physics.Sphere(1.0, 1.0, pos=(3, 4, 0)), (0, 0, 0), (3 * size, 4 * size, 0))[0] == pytest.approx(4.0)
 
 
-# --- against a search along the line -------------------------------------------------------------------------------------
+# --- against a search along the line ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -204,7 +204,8 @@ def test_the_point_hit_is_on_the_surface_and_no_point_before_it_is_inside(seed):
             assert gauges[code](o + t * d + 1e-6 * n) > 0  # out of the body
             assert (gauges[code](o) <= 0) == (n @ d > 0)  # from inside the ray leaves, from outside it enters
         if code == NOTHING:
-            assert t == math.inf and not n.any()
+            assert t == math.inf
+            assert not n.any()
         started = [inside(o) <= 0 for inside in gauges]
         for s in np.linspace(0, min(t, REACH), 50)[1:-1]:
             assert [inside(o + s * d) <= ROUNDING for inside in gauges] == [
@@ -262,7 +263,7 @@ def test_the_tree_of_boxes_leaves_no_body_out(count):
     distances = np.array([each.distance[0] for each in alone])
     np.testing.assert_array_equal(together.distance[0], distances.min(axis=0))
     hit = np.isfinite(together.distance[0])
-    assert 10 <= hit.sum() or count < 16
+    assert hit.sum() >= 10 or count < 16
     np.testing.assert_array_equal(together.hit[0], np.where(hit, distances.argmin(axis=0), NOTHING))
     for r in np.flatnonzero(hit):
         np.testing.assert_array_equal(together.normal[0, r], alone[together.hit[0, r]].normal[0, r])
@@ -433,5 +434,5 @@ def test_a_result_of_another_size_is_refused():
     with pytest.raises(ValueError, match=r"out.hit is .*; allowed is a contiguous array of int64 in shape \(2, 1\)"):
         world.cast_rays((0, 0, 0), (1, 0, 0), out=hits._replace(hit=hits.distance))
     hits.normal.flags.writeable = False
-    with pytest.raises(ValueError, match="out.normal"):
+    with pytest.raises(ValueError, match=r"out\.normal"):
         world.cast_rays((0, 0, 0), (1, 0, 0), out=hits)

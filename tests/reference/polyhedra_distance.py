@@ -67,9 +67,7 @@ def distance_apart(a: Posed, b: Posed) -> float:
         for loop in other.loops
         for pair in pairwise(loop[1:])
     ]
-    found += [
-        _segments(*a.corners[list(edge)], *b.corners[list(other)]) for edge, other in product(a.edges, b.edges)
-    ]
+    found += [_segments(*a.corners[list(edge)], *b.corners[list(other)]) for edge, other in product(a.edges, b.edges)]
     return min(found)
 
 

@@ -1,4 +1,4 @@
-"""Where a line meets convex bodies, by search along the line: a slow oracle for rays, with no closed form of a surface.
+"""Points at which a line meets convex bodies, by search along the line: a slow oracle with no closed form of a surface.
 
 A body is the set of points where its gauge is at most 0: the largest height above its faces, or |A x| - 1 of an
 ellipsoid. The gauge is convex, and so is its course along a line. Its minimum is found by a golden-section search, and

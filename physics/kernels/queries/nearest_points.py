@@ -75,7 +75,7 @@ def _nearest_of_ellipsoid(a, b, scratch):
 
 @kernel
 def _nearest_of_ellipsoid_hull(a, b, scratch):
-    """Nearest points of an ellipsoid a and a hull b; see `multibody.narrowphase.hull_ellipsoid.collide_ellipsoid_hull`."""
+    """Nearest points of an ellipsoid a and a hull b; see `hull_ellipsoid.collide_ellipsoid_hull`."""
     hulls, origin = scratch.narrowphase.hulls, row_vector(scratch.bodies.center, b, 0)
     pose_hull(0, b, origin, scratch)
     way = minus(row_vector(scratch.bodies.center, a, 0), origin)

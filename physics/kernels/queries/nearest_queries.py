@@ -18,7 +18,7 @@ from physics.kernels.queries.ray_cast import NOTHING
 
 
 class Pairs(NamedTuple):
-    """Pairs of which the nearest points are asked for, the same in all worlds."""
+    """Pairs whose nearest points are requested, the same in all worlds."""
 
     first: np.ndarray  # (pairs,) int, bodies
     second: np.ndarray  # (pairs,) int, bodies, or -1 - k for wall k
@@ -95,7 +95,10 @@ def _is_beyond(a, b, distance, scratch):
 
 @kernel
 def _nearest_to_probe(probe, count, max_distance, exclude, scratch):
-    """Nearest body or wall to the body in row `probe`: (code, (gap, n, p, q)); of equal ones the first, bodies first."""
+    """Nearest body or wall to the body in row `probe`: (code, (gap, n, p, q)).
+
+    Of equal gaps the first body counts, and a body before a wall.
+    """
     none = (0.0, 0.0, 0.0)
     best, code = (math.inf, none, none, none), NOTHING
     for b in range(count):

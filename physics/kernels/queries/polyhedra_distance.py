@@ -76,7 +76,7 @@ def _point_of_first(v, count, pair):
 
 @kernel
 def _nearest_apart(a, b, scratch):
-    """Vector from b to a between the nearest points, and the point of a, from the centre of b; (0, 0, 0) if they touch."""
+    """Vector from b to a between the nearest points, and the point of a from the centre of b; zeros if they touch."""
     pair, origin = scratch.narrowphase, (0.0, 0.0, 0.0)
     x = minus(row_vector(scratch.bodies.center, a, 0), row_vector(scratch.bodies.center, b, 0))
     v, count, touch = x, 0, _TOUCHING * max(scratch.bodies.body[a].radius, scratch.bodies.body[b].radius)

@@ -16,7 +16,6 @@ from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.queries.box_tree import build_tree, find_bodies, safe_inverse
 from physics.kernels.queries.query_scratch import pose_world
 from physics.kernels.queries.ray_shapes import (
-    MISS,
     ray_block,
     ray_ellipsoid,
     ray_plane,
@@ -127,9 +126,7 @@ def cast_rays_of_world(k, indices, bodies, scratch, rays, hits):
         if rays.carrier >= 0:
             o, d = plus(x, qt.matvec(R, o)), qt.matvec(R, d)
         place = k * rays.count + r
-        hits.distance[place], hits.hit[place], normal = cast_ray(
-            o, d, rays.max_distance, rays.exclude, scratch
-        )
+        hits.distance[place], hits.hit[place], normal = cast_ray(o, d, rays.max_distance, rays.exclude, scratch)
         put_vector(hits.normal, place, 0, normal)
 
 
