@@ -34,6 +34,8 @@ from physics.work_precision.result import Frontier, FrontierPoint
 from physics.work_precision.run import frontier, ladder
 from physics.work_precision.truth import Truth
 from physics.world.impacts import Impacts
+from physics.world.nearest import Nearest
+from physics.world.ray_hits import RayHits
 from physics.world.report import Solver, Status, StepReport
 from physics.world.rollout import Rollout, rollout
 from physics.world.snapshot import Snapshot
@@ -66,7 +68,9 @@ __all__ = [
     "Hull",
     "Impacts",
     "Magnus",
+    "Nearest",
     "Push",
+    "RayHits",
     "Recorder",
     "Recording",
     "Replay",

@@ -11,7 +11,10 @@ def polyhedra(bodies: tuple[Body, ...]) -> list:
 
     A hull has its own polyhedron, a block the unit cube, and a round body None.
     """
-    if not any(body.kind == "hull" for body in bodies):
-        return []
+    return every_polyhedron(bodies) if any(body.kind == "hull" for body in bodies) else []
+
+
+def every_polyhedron(bodies: tuple[Body, ...]) -> list:
+    """Polyhedron of each body, also of blocks in a scene without hulls; None for a round body."""
     blocks = {"block": CUBE}
     return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]

@@ -149,6 +149,7 @@ class Batch(Exclusive):
     team: Team
     scratch: list
     motions: list
+    _queries: Any  # `QueryCalls`, or None before the first query
     recorder: StepListener | None
     telling: int | None
     is_torn: bool

@@ -28,6 +28,8 @@ from physics.summary import counted
 from physics.undo import undo_on_error
 from physics.world import batch_arrays, parameters, restoring, rollback, setters
 from physics.world.actuator import Actuation
+from physics.world.queries import Querying
+from physics.world.query_calls import QueryCalls
 from physics.world.report import StepReport
 from physics.world.scene_settings import scene_settings
 from physics.world.snapshot import Snapshot
@@ -36,7 +38,7 @@ from physics.world.touching import Touching
 
 
 @known_keywords
-class World(Touching):
+class World(Touching, Querying):
     """Batch of independent worlds of one scene, which are stepped together.
 
     A world gives the same bits whatever the batch size, its place in the batch and the number of threads.
@@ -135,6 +137,7 @@ class World(Touching):
         self.motions = [
             self.plan.scheme.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)
         ]
+        self._queries: QueryCalls | None = None  # made at the first query
         self._wrench = self.no_wrench()
         self._calls: list[BoundCall] = []
         self._bound_for: tuple | None = None  # steps and dt for which `_calls` are bound
@@ -413,7 +416,18 @@ class World(Touching):
         kept = dict(vars(self))
         views = ("pos", "quat", "linvel", "angvel")
         flags = ("is_torn", "telling", "is_plain", "is_bound")
-        for name in ("plan", "team", "scratch", "motions", "_wrench", "_calls", "_bound_for", *flags, *views):
+        for name in (
+            "plan",
+            "team",
+            "scratch",
+            "motions",
+            "_queries",
+            "_wrench",
+            "_calls",
+            "_bound_for",
+            *flags,
+            *views,
+        ):
             del kept[name]
         for name in ("is_free", "_user"):  # of `Exclusive`: a copy is free
             kept.pop(name, None)

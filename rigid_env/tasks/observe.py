@@ -8,6 +8,7 @@ after that; larger ones are clipped.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from physics import validation
 from rigid_env.tasks.actions import check_body
@@ -75,6 +76,26 @@ def wall_gaps(body: int = 0, walls: int = 3, scale: float = LENGTH, bound: float
     """Gaps between a body and each of the scene's first `walls` walls [m]; negative where it overlaps a wall."""
     names = _names("gap", body, [f"to wall {k}" for k in range(walls)])
     return Entry(names, "m", -1.0, bound, lambda worlds: worlds.wall_gaps[:, body, :walls], scale)
+
+
+def lidar(body: int, directions: ArrayLike, max_distance: float, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Entry:
+    """Distances along rays that a body carries, over `max_distance`: 1 where a ray hits nothing within it.
+
+    Rays hit other bodies and walls, and pass through the body itself. `directions` (rays, 3), of any length but 0, and
+    `origin` (3,), from the centre of mass [m], are in the frame of the body.
+    """
+    ways = validation.rows(directions, 3, "directions")
+    if not ways.any(axis=1).all():
+        raise ValueError(f"directions[{int(np.argmin(ways.any(axis=1)))}] is (0, 0, 0); allowed are other vectors")
+    start = validation.finite(origin, (3,), "origin")
+    farthest = float(validation.positive(max_distance, (), "max_distance"))
+    names = _names("lidar", body, range(len(ways)))
+
+    def read(worlds):
+        distance = worlds.cast_rays(start, ways, farthest, body).distance
+        return np.minimum(distance, farthest)
+
+    return Entry(names, "m", 0.0, 1.0, read, farthest)
 
 
 def contact_force(body: int = 0, bound: float = REACH) -> Entry:

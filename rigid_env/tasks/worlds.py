@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from physics import Contacts, Impacts
+from physics import Contacts, Impacts, RayHits
 from rigid_env.tasks.named import Named
 from rigid_env.tasks.reading import write_rotations, write_wall_gaps
 from rigid_env.tasks.task_parts import Watched
@@ -109,6 +110,10 @@ class Worlds:
         if self._sums is None:
             self._sums = self._task.world.read_contact_sums(self._read)
         return self._sums
+
+    def cast_rays(self, origins, directions, max_distance: float = math.inf, carrier: int | None = None) -> RayHits:
+        """Cast rays into these worlds; `physics.World.cast_rays` has the arguments."""
+        return self._task.world.cast_rays(origins, directions, max_distance, carrier, worlds=self._read)
 
     @property
     def contacts(self) -> Contacts:

@@ -84,7 +84,7 @@ def collide_sphere_hull(a, b, margin, h, many):
 
 
 @inlined
-def _separation(hull, A, way, n, many):
+def hull_separation(hull, A, way, n, many):
     """Separation σ(n) of an ellipsoid and a hull along the unit vector n [m], as in `ellipsoid_distance`.
 
     The hull is number 0 of the pair. The ellipsoid has its centre at `way`, in the coordinates of the pair, and the
@@ -97,7 +97,7 @@ def _separation(hull, A, way, n, many):
 
 
 @inlined
-def _direction_from_edge(e, hull, S, dims, way, many):
+def direction_from_edge(e, hull, S, dims, way, many):
     """Unit vector along which an ellipsoid is farthest apart from edge e of a hull, out of the hull.
 
     The hull is number 0 of the pair. The ellipsoid has rotation matrix S, semi-axes `dims` [m] and its centre at `way`,
@@ -154,8 +154,8 @@ def collide_ellipsoid_hull(a, b, margin, h, many):
     n = row_vector(hulls.normal[0], face, 0)
     if not is_above_face(0, hull, face, subtract(way, ellipsoid_support_point(A, n)[1]), many):
         for e in range(hulls.of[hull, LAST_EDGE] - hulls.of[hull, FIRST_EDGE]):
-            m = _direction_from_edge(e, hull, S, dims, way, many)
-            gap = _separation(hull, A, way, m, many)
+            m = direction_from_edge(e, hull, S, dims, way, many)
+            gap = hull_separation(hull, A, way, m, many)
             if gap > best:
                 best, n = gap, m
     if best > margin:

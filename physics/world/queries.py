@@ -1,0 +1,207 @@
+"""Queries of the present state of a batch of worlds, without a step: methods of `World`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from physics import validation
+from physics.kernels.queries.nearest_queries import Pairs, Probe, measure_pairs, probe_worlds
+from physics.kernels.queries.ray_cast import NOTHING, Hits, Rays, cast_rays
+from physics.parallel.exclusive import exclusive
+from physics.scene.bodies import Body
+from physics.world import choice
+from physics.world.batch import Batch
+from physics.world.nearest import Nearest, attitudes, nearest_result, pairs_of, shape_numbers
+from physics.world.query_arguments import common_count, largest_distance, result, row_steps, vectors
+from physics.world.query_calls import QueryCalls
+from physics.world.ray_hits import RayHits
+
+
+class Querying(Batch):
+    """Base of `World` with the methods that ask about its present state."""
+
+    @exclusive
+    def cast_rays(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        max_distance: float = math.inf,
+        carrier: int | None = None,
+        exclude: int | None = None,
+        worlds: ArrayLike | None = None,
+        out: RayHits | None = None,
+    ) -> RayHits:
+        """Find the first body or wall that each ray meets; the threads of the batch share the worlds.
+
+        A ray that starts inside a body meets its surface from within, where it leaves. A wall is met from its free side
+        only. Of bodies at equal distances the first is reported, and a body before a wall.
+
+        Parameters
+        ----------
+        origins, directions : (n, rays, 3) array_like
+            Starts of the rays [m] and their directions, of any length but 0, world frame, for n worlds. (rays, 3): the
+            same for all worlds; (3,) and (n, 1, 3): the same for all rays.
+        max_distance : float
+            Largest distance of a hit [m].
+        carrier : int, optional
+            Index of a body that carries the sensor: origins and directions are in its frame, from its centre of mass.
+        exclude : int, optional
+            Index of a body that rays pass through. None: the carrier, if there is one.
+        worlds : (n,) int array_like or (worlds,) mask, optional
+            Indices of the worlds to ask, in this order; None: all.
+        out : RayHits, optional
+            Result of an earlier call with as many worlds and rays, which is overwritten and returned.
+
+        Returns
+        -------
+        RayHits
+            Distance, body or wall, and normal of each hit.
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, a number that is not finite, a direction of zeros, a distance that is negative or NaN, or a
+            body or a world that does not exist.
+        RuntimeError
+            Another thread is stepping or changing this world.
+
+        Notes
+        -----
+        The distance is exact to rounding: a few 1e-16 times the distance of the origin from the body, plus the distance
+        of both from the world's origin. The bits of a ray depend neither on other rays nor on other worlds.
+        """
+        indices, asked = self._asked(worlds)
+        start, way = vectors(origins, asked, "origins"), vectors(directions, asked, "directions", may_vanish=False)
+        count = common_count({"origins": start, "directions": way}, "rays")
+        rays = Rays(
+            start.reshape(-1, 3), way.reshape(-1, 3), row_steps(start), row_steps(way),
+            count, largest_distance(max_distance), self._code(carrier, "carrier"),
+            self._code(carrier if exclude is None else exclude, "exclude"),
+        )  # fmt: skip
+        shape = asked, count
+        hits = result(out, RayHits, {"distance": shape, "hit": shape, "normal": (*shape, 3)})
+        rows = Hits(hits.distance.reshape(-1), hits.hit.reshape(-1), hits.normal.reshape(-1, 3))
+        self._ask(cast_rays, indices, rays, rows)
+        return hits
+
+    @exclusive
+    def measure_distances(
+        self, first: ArrayLike, second: ArrayLike, worlds: ArrayLike | None = None, out: Nearest | None = None
+    ) -> Nearest:
+        """Find the nearest points of pairs of bodies, or of bodies and walls, whether they may touch or not.
+
+        Parameters
+        ----------
+        first : (pairs,) int array_like or int
+            Indices of bodies.
+        second : (pairs,) int array_like or int
+            Indices of bodies, or -1 - k for wall k.
+        worlds : (n,) int array_like or (worlds,) mask, optional
+            Indices of the worlds to ask, in this order; None: all.
+        out : Nearest, optional
+            Result of an earlier call with as many worlds and pairs, which is overwritten and returned.
+
+        Returns
+        -------
+        Nearest
+            Gap, normal and nearest points of each pair in each world.
+
+        Raises
+        ------
+        ValueError
+            A body, wall or world that does not exist, a body paired with itself, or different numbers of both.
+        RuntimeError
+            Another thread is stepping or changing this world.
+        """
+        indices, asked = self._asked(worlds)
+        a, b = pairs_of(first, second, self.body_count, len(self.walls))
+        found, rows = nearest_result(out, asked, len(a))
+        self._ask(measure_pairs, indices, Pairs(a, b), rows)
+        return found
+
+    @exclusive
+    def nearest_to(
+        self,
+        shape: Body | None,
+        pos: ArrayLike,
+        quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        max_distance: float = math.inf,
+        exclude: int | None = None,
+        worlds: ArrayLike | None = None,
+        out: Nearest | None = None,
+    ) -> Nearest:
+        """Find the nearest body or wall to a shape, or to a point, that is no part of the scene.
+
+        Parameters
+        ----------
+        shape : Body or None
+            Shape, such as ``physics.Block(size, mass)``; its mass and start do not matter. None: a point.
+        pos, quat : (n, poses, 3|4) array_like
+            Poses of the shape, as of a body: centre of mass [m] and attitude (w, x, y, z), for n worlds. (poses, 3|4):
+            the same for all worlds; (3|4,) and (n, 1, 3|4): the same for all poses.
+        max_distance : float
+            Largest gap of a result [m]; what is farther away is left out, and costs less.
+        exclude : int, optional
+            Index of a body that is left out.
+        worlds : (n,) int array_like or (worlds,) mask, optional
+            Indices of the worlds to ask, in this order; None: all.
+        out : Nearest, optional
+            Result of an earlier call with as many worlds and poses, which is overwritten and returned.
+
+        Returns
+        -------
+        Nearest
+            The nearest body or wall, with its gap, normal and nearest points, for each pose in each world. Of equal
+            gaps the first body counts, and a body before a wall.
+
+        Raises
+        ------
+        ValueError
+            A wrong shape, a number that is not finite, no unit quaternion, or a body or world that does not exist.
+        RuntimeError
+            Another thread is stepping or changing this world.
+        """
+        indices, asked = self._asked(worlds)
+        place, turn = vectors(pos, asked, "pos", "poses"), attitudes(quat, asked)
+        count = common_count({"pos": place, "quat": turn}, "poses")
+        code, dims, radius, center, solid = shape_numbers(shape)
+        probe = Probe(
+            code, dims, radius, center, place.reshape(-1, 3), turn.reshape(-1, 4), row_steps(place), row_steps(turn),
+            count, largest_distance(max_distance), self._code(exclude, "exclude"),
+        )  # fmt: skip
+        found, rows = nearest_result(out, asked, count)
+        self._ask(probe_worlds, indices, probe, rows, solid=solid)
+        return found
+
+    def overlaps(
+        self,
+        shape: Body | None,
+        pos: ArrayLike,
+        quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        margin: float = 0.0,
+        exclude: int | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> NDArray[np.bool_]:
+        """Tell where a shape in given poses touches or overlaps a body or a wall: (n, poses) bool.
+
+        `margin` [m] is a gap that counts as touching. `nearest_to` has all other arguments and the errors.
+        """
+        return np.isfinite(self.nearest_to(shape, pos, quat, margin, exclude, worlds).gap)
+
+    def _asked(self, worlds: ArrayLike | None) -> tuple[NDArray[np.int64] | None, int]:
+        """Indices of the worlds to ask, or None for all, and their number."""
+        if worlds is None:
+            return None, self.worlds
+        indices = choice.world_indices(worlds, self.worlds, once=False)
+        return indices, len(indices)
+
+    def _code(self, body: int | None, field: str) -> int:
+        return NOTHING if body is None else validation.index(body, self.body_count, field)
+
+    def _ask(self, kernel, indices: np.ndarray | None, *question, solid=None) -> None:
+        if self._queries is None:
+            self._queries = QueryCalls(self)
+        self._queries.ask(kernel, indices, *question, solid=solid)
