@@ -25,7 +25,7 @@ LAYERS = (
     (
         "physics/kernels, compiled", "#dff3e4",
         (
-            "multibody | event_driven | time_stepping", "contact_solver · contact_law · half_space",
+            "queries · multibody | event_driven | time_stepping", "contact_solver · contact_law · half_space",
             "forces · flight · state · lcp · parallel · math",
         ),
     ),

@@ -17,6 +17,9 @@ from physics.world.batch import Batch
 # Places of the arguments of a query kernel: queue, worlds, bodies, scratch, then the question and its answer.
 _QUEUE, _INDICES, _QUESTION = 0, 1, 4
 
+# Different polyhedra for which scratch and calls are kept; a further one clears all.
+MOST_SOLIDS = 16
+
 
 class QueryCalls:
     """Prepared calls of query kernels, with the scratch memory of each thread.
@@ -51,10 +54,11 @@ class QueryCalls:
         else:
             queues, places = [_queue_of(len(indices))], indices
         key, same = (kernel, is_all, id(solid)), _contents(question)
+        scratches = self._scratch_for(solid)
         if key not in self._calls:
             self._calls[key] = [
                 bound_alike(None, kernel, queue, places, self._bodies, scratch, *question)
-                for queue, scratch in zip(queues, self._scratch_for(solid))
+                for queue, scratch in zip(queues, scratches)
             ]
         elif self._bound[key] != same:
             for call in self._calls[key]:
@@ -72,6 +76,9 @@ class QueryCalls:
     def _scratch_for(self, solid: Any) -> list[QueryScratch]:
         """Scratch memory of each thread, with room for a shape besides the bodies; the solid is kept for its `id`."""
         if id(solid) not in self._scratch:
+            if len(self._scratch) == MOST_SOLIDS:
+                for kept in (self._scratch, self._calls, self._bound):
+                    kept.clear()
             bodies, solids = len(self._solids), [*self._solids, solid]
             made = [make_query_scratch(bodies, self._walls, solids) for _ in range(self._team.size)]
             self._scratch[id(solid)] = solid, made

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import physics
 from physics.rotations import rotation_matrices
+from physics.world.query_calls import MOST_SOLIDS
 from tests.physics.test_rays import batch_of, bodies_of, quaternion, same
 from tests.reference.polyhedra_distance import distance_apart, posed, separation
 from tests.reference.rays import gauge
@@ -256,6 +257,15 @@ def test_bits_depend_neither_on_batch_nor_threads(threads, rng):
     same(again, batch_of().nearest_to(shape, pos + 1.0, quat))
     box = world.nearest_to(physics.Block((1, 2, 3), 1.0), pos, quat)  # another shape, with tables of its own
     same(box, batch_of().nearest_to(physics.Block((1, 2, 3), 1.0), pos, quat))
+
+
+def test_many_different_shapes_are_compared_and_not_all_kept(rng):
+    world, shapes = world_of(CUBE), [physics.Hull(rng.uniform(-1, 1, (6, 3)), 1.0) for _ in range(3 * MOST_SOLIDS)]
+    for shape in (*shapes, *shapes[:2]):
+        found, alone = (each.nearest_to(shape, (0.0, 4, 0)) for each in (world, world_of(CUBE)))
+        same(found, alone)
+        assert len(world._queries._scratch) <= MOST_SOLIDS
+    assert world.cast_rays((0, 4, 0), (0, -1, 0)).distance[0, 0] == 3.0
 
 
 # --- refused ----------------------------------------------------------------------------------------------------------
