@@ -63,9 +63,10 @@ def parts_table(item: HasParts, *more: tuple[str, str]) -> str:
     return table(type(item).__name__, (*map(_split, item._parts()), *more))
 
 
-def fields_table(item: Any) -> str:
-    """HTML table of a dataclass object: a row for each field that its `repr` shows."""
-    values = ((field.name, getattr(item, field.name)) for field in fields(item) if field.repr)
+def fields_table(item: Any, omitted: tuple[str, ...] = ()) -> str:
+    """HTML table of a dataclass object: a row for each field that its `repr` shows, without the fields `omitted`."""
+    shown_fields = (field for field in fields(item) if field.repr and field.name not in omitted)
+    values = ((field.name, getattr(item, field.name)) for field in shown_fields)
     return table(type(item).__name__, ((name, _value(value)) for name, value in values))
 
 

@@ -60,9 +60,14 @@ def shown(value: object, longest: int = LONGEST_VALUE) -> str:
     return f"{text[: longest - tail - 5]} ... {text[-tail:]}"
 
 
-def fields_repr(item) -> str:
-    """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value."""
-    parts = [(field.name, getattr(item, field.name)) for field in fields(item) if field.repr]
+def fields_repr(item, omitted: tuple[str, ...] = ()) -> str:
+    """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value.
+
+    The fields `omitted` are left out.
+    """
+    parts = [
+        (field.name, getattr(item, field.name)) for field in fields(item) if field.repr and field.name not in omitted
+    ]
     name = type(item).__qualname__
     text = f"{name}({', '.join(f'{key}={value!r}' for key, value in parts)})"
     if len(text) <= SCREEN:

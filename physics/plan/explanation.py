@@ -51,6 +51,15 @@ def _between_row(scene, contact, many) -> Row:
     return Row("body contact", False, "declared without contact between bodies", "")
 
 
+def _fixed_rows(scene) -> tuple[Row, ...]:
+    """Row that names the fixed bodies of a scene; none if it has no fixed body."""
+    fixed = [b for b, body in enumerate(scene.bodies) if body.fixed]
+    if not fixed:
+        return ()
+    reason = f"declared: {'body' if len(fixed) == 1 else 'bodies'} {', '.join(map(str, fixed))}"
+    return (Row("fixed bodies", True, reason, "to the solver walls, with a shape of their own"),)
+
+
 def _friction_row(friction, rubbing) -> Row:
     if rubbing:
         cone = "circular cone" if friction.axis is None else "elliptic cone"
@@ -154,6 +163,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
     contact, friction, touching, rubbing = needs.contact, needs.friction, needs.touching, needs.rubbing
     return (
         _gravity_row(needs.gravity),
+        *_fixed_rows(scene),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
         _sleeping_row(scene, touching, needs.sleeping),

@@ -43,6 +43,7 @@ from physics.kernels.multibody.stepping.impact import FORETOLD
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
+from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.groups import FlightSwitches, has_friction
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 from physics.kernels.state.sleeping import is_asleep
@@ -140,6 +141,8 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
     if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
         return
     for b in range(many.bodies.state.shape[0]):
+        if is_fixed(b, many.bodies):
+            continue
         if many.bodies.touched[b] == 1:
             hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.body[b])
         else:
@@ -183,7 +186,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     """
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
-        if is_asleep(first + b, sleep):
+        if is_asleep(first + b, sleep) or is_fixed(b, many.bodies):
             continue
         if many.bodies.touched[b] == 0:
             flight = FlightSwitches(switches.flight.gyroscopic, switches.flight.offset_frame, switches.flight.scheme)
