@@ -17,6 +17,12 @@ def _same_end(end, many):
     return end
 
 
+@if_given("many.bodies.fixed", False)
+def has_fixed(many):
+    """True if the scene has fixed bodies."""
+    return True
+
+
 @if_given("many.bodies.fixed", _same_end)
 def body_at(end, many):
     """Index of the body at an end of a contact, whether it moves or is fixed; below 0 for a wall."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.target_velocity import (
     GAP_CLOSING_SHARE,
     MAX_TARGET_TURN,
@@ -31,6 +31,7 @@ from physics.kernels.multibody.data.contact_set import (
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
 from physics.kernels.multibody.data.kinematics import update_body_pose
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
@@ -97,6 +98,21 @@ def _coriolis(k, many):
     return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), relative_velocity(k, many.bodies.twist, many)))
 
 
+@if_given("many.bodies.fixed", 0.0)
+def _turn_of_line(a, b, many):
+    """Acceleration |u|²/d of the gap of two spheres because the line of their centres turns [m/s²]; else 0.
+
+    u is the relative velocity of the centres across that line, d their distance. `b` is an end of a contact.
+    """
+    b = body_at(b, many)
+    if b < 0 or not many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
+        return 0.0
+    d = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
+    u = subtract(row_vector(many.bodies.twist, a, 0), row_vector(many.bodies.twist, b, 0))
+    square, along = qt.dot(d, d), qt.dot(u, d)
+    return (qt.dot(u, u) - along * along / square) / math.sqrt(square) if square > 0.0 else 0.0
+
+
 @inlined
 def set_resting_targets(n, h, many):
     """Set the target velocities of the n contacts in a resting stage of length h [s], with gaps at its middle.
@@ -113,8 +129,9 @@ def set_resting_targets(n, h, many):
         if b >= 0:
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+        t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
         gap = many.contacts.gap[k]
-        if many.settings[0].is_error_controlled == 1:
+        if many.settings[0].is_error_controlled == 1 or has_fixed(many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
         t = clamp_target_to_energy(t, contact_velocity(k, many))
