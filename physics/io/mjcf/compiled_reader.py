@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 
 from physics.io.mjcf import forces
-from physics.io.mjcf.compiled_bodies import BodyElements, free_bodies
+from physics.io.mjcf.compiled_bodies import SHAPES, BodyElements, fixed_bodies, free_bodies
 from physics.io.mjcf.contacts import contact_effects, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, compile_model
@@ -42,16 +43,19 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
         raise ModelError(f"there is no free body that a scene can hold; allowed is at least one{told}")
     for error in forces.joint_faults(model, free):
         left.add(error)
-    planes, contact = _contact(model, touching, free, left)
+    met, contact = _contact(model, touching, free, left)
+    planes = [geom for geom in met if _kind(model, geom) == "plane"]
+    fixed = fixed_bodies(model, [geom for geom in met if geom not in planes], left)
     fields = forces.damping(model, free, left)
     effects = [*forces.gravity(model, free, left), *contact, *fields]
-    return Scene([each.body for each in free], [_wall(model, plane) for plane in planes], effects)
+    bodies = sorted([(each.root, each.body) for each in free] + fixed, key=itemgetter(0))
+    return Scene([body for _, body in bodies], [_wall(model, plane) for plane in planes], effects)
 
 
 def _contact(model: Model, touching: Touching, free: list[BodyElements], left: LeftOut) -> tuple[list[int], list]:
-    """Find the numbers of the plane geoms that are walls, and the effects `Contact` and `Friction`."""
+    """Find the numbers of the geoms that are walls or fixed bodies, and the effects `Contact` and `Friction`."""
     bodies = [touching.surface(each.geom) for each in free]
-    met = _met_planes(model, touching, dict.fromkeys(bodies), left)
+    met = _met_geoms(model, touching, dict.fromkeys(bodies), left)
     effects = contact_effects(bodies, [touching.surface(plane) for plane in met], left, touching.friction_of)
     if not effects:
         return [g for g in _fixed_geoms(model) if _kind(model, g) == "plane"], effects
@@ -69,17 +73,18 @@ def _fixed_geoms(model: Model) -> list[int]:
     return [g for g in range(m.ngeom) if not model.moves(int(m.geom_bodyid[g]))]
 
 
-def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
-    """Numbers of the fixed plane geoms that a body can touch; other fixed geoms that touch bodies go to `left`."""
+def _met_geoms(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
+    """Numbers of the fixed geoms that a body can touch; those that a scene cannot hold go to `left`."""
     met = []
     for geom in _fixed_geoms(model):
         if not touched(touching.surface(geom), bodies, touching.friction_of):
             continue
         body, kind = int(model.data.geom_bodyid[geom]), _kind(model, geom)
-        if kind != "plane":
-            left.add(model.error("geom", geom, f"is a fixed {kind}; allowed of the world are planes"))
+        if kind not in ("plane", *SHAPES):
+            allowed = ", ".join(("plane", *SHAPES))
+            left.add(model.error("geom", geom, f"is a fixed {kind}; allowed of the world are {allowed}"))
         elif model.data.body_mocapid[body] >= 0:
-            left.add(model.error("geom", geom, "is a plane that is moved by mocap; allowed are planes that stay"))
+            left.add(model.error("geom", geom, f"is a {kind} that is moved by mocap; allowed are geoms that stay"))
         else:
             met.append(geom)
     return met

@@ -11,7 +11,7 @@ import numpy as np
 from physics import validation
 from physics.io.mjcf.contacts import Surface, contact_effects, touched
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.shapes import Placed, make_body
+from physics.io.mjcf.shapes import Placed, make_body, make_fixed
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.io.mjcf.writer import unnamed
 from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
@@ -72,15 +72,22 @@ def read_scene(root: Element) -> Scene:
     for plane in planes:
         if _type(plane) != "plane":
             raise _unread(plane, f"of the world is a {_type(plane)}; allowed are planes")
-    elements = world.findall("body")
+    elements, is_free = world.findall("body"), [_has_joint(body) for body in world.findall("body")]
     meshes = {mesh.get("name"): mesh for mesh in root.iterfind("asset/mesh")}
-    starts = _starts(root, elements)
-    bodies = [_body(b, element, meshes, *start) for b, (element, start) in enumerate(zip(elements, starts))]
+    starts = iter(_starts(root, [element for element, free in zip(elements, is_free) if free]))
+    bodies = [
+        _body(b, element, meshes, *next(starts)) if free else _fixed_body(b, element, meshes)
+        for b, (element, free) in enumerate(zip(elements, is_free))
+    ]
     option = root.find("option")
     gravity = _numbers(root if option is None else option, "gravity", 3, DEFAULT_GRAVITY)
     effects = [Gravity(gravity)] if gravity.any() else []
-    surfaces, floors = [_surface(element.find("geom")) for element in elements], [_surface(plane) for plane in planes]
-    contact = contact_effects(surfaces, [floor for floor in floors if touched(floor, surfaces)], LeftOut())
+    surfaces = [_surface(element.find("geom")) for element, free in zip(elements, is_free) if free]
+    floors = [_surface(plane) for plane in planes]
+    still = [None if free else _surface(element.find("geom")) for element, free in zip(elements, is_free)]
+    met = [surface for surface in floors + still if surface is not None and touched(surface, surfaces)]
+    contact = contact_effects(surfaces, met, LeftOut())
+    bodies = [body for body, surface in zip(bodies, still) if surface is None or surface in met or not contact]
     walls = [_wall(plane) for plane, floor in zip(planes, floors) if not contact or touched(floor, surfaces)]
     return Scene(bodies, walls, effects + contact)
 
@@ -196,6 +203,36 @@ def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np
     return list(zip(poses, velocities))
 
 
+def _has_joint(element: Element) -> bool:
+    """True if a body element has a joint; else it is fixed."""
+    return element.find("freejoint") is not None or element.find("joint") is not None
+
+
+def _fixed_body(b: int, element: Element, meshes: dict) -> Body:
+    """Make a fixed body from body element number `b`, which has no joint."""
+    geom, kind, shape = _only_geom(element, meshes)
+    pose = np.concatenate((_numbers(element, "pos", 3, "0 0 0"), _unit(element)))
+    arm = _numbers(geom, "pos", 3, "0 0 0")
+    pose[:3] += rotation_matrices(pose[3:]) @ arm
+    name = element.get("name")
+    try:
+        return make_fixed(kind, shape, pose, None if name in (None, "", unnamed(b)) else name)
+    except ValueError as error:
+        raise _error(element, f"in a scene: {error}") from None
+
+
+def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray]:
+    """Find the only geom of a body element: the geom, its kind, and its half axes or points [m]."""
+    geoms = element.findall("geom")
+    if len(geoms) != 1:
+        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
+    geom, kind = geoms[0], _type(geoms[0])
+    if kind not in SHAPES:
+        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
+    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    return geom, kind, _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
+
+
 def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np.ndarray) -> Body:
     """Make the scene's body from body element number `b`, its pose (7,) and velocity (6,) at the start.
 
@@ -204,14 +241,7 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")
-    geoms = element.findall("geom")
-    if len(geoms) != 1:
-        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
-    geom, kind = geoms[0], _type(geoms[0])
-    if kind not in SHAPES:
-        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
-    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
-    shape = _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
+    geom, kind, shape = _only_geom(element, meshes)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
     name = element.get("name")
     try:

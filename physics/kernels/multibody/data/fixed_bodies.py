@@ -17,7 +17,11 @@ def _same_end(end, many):
     return end
 
 
-@if_given("many.bodies.fixed", False)
+def _has_none(many):
+    return False
+
+
+@if_given("many.bodies.fixed", _has_none)
 def has_fixed(many):
     """True if the scene has fixed bodies."""
     return True
