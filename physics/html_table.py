@@ -62,9 +62,9 @@ def parts_table(item: HasParts, *more: tuple[str, str]) -> str:
     return table(type(item).__name__, (*map(_split, item._parts()), *more))
 
 
-def fields_table(item: Any) -> str:
-    """HTML table of a dataclass object: a row for each field that its `repr` shows."""
-    return table(type(item).__name__, ((name, _value(value)) for name, value in shown_fields(item)))
+def fields_table(item: Any, omitted: tuple[str, ...] = ()) -> str:
+    """HTML table of a dataclass object: a row for each field that its `repr` shows, without the fields `omitted`."""
+    return table(type(item).__name__, ((name, _value(value)) for name, value in shown_fields(item, omitted)))
 
 
 def _value(value: object) -> str:

@@ -63,8 +63,8 @@ def shown(value: object, longest: int = LONGEST_VALUE) -> str:
     return f"{text[: longest - tail - 5]} ... {text[-tail:]}"
 
 
-def shown_fields(item: Any) -> list[tuple[str, Any]]:
-    """Names and values of the fields of a dataclass object that its `repr` shows.
+def shown_fields(item: Any, omitted: tuple[str, ...] = ()) -> list[tuple[str, Any]]:
+    """Names and values of the fields of a dataclass object that its `repr` shows, without the fields `omitted`.
 
     A field with the metadata `SHOWN_IF_GIVEN` is left out while it has its default.
     """
@@ -72,13 +72,17 @@ def shown_fields(item: Any) -> list[tuple[str, Any]]:
         (field.name, value)
         for field in fields(item)
         if field.repr
+        and field.name not in omitted
         and ((value := getattr(item, field.name)) is not field.default or field.metadata != SHOWN_IF_GIVEN)
     ]
 
 
-def fields_repr(item) -> str:
-    """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value."""
-    parts = shown_fields(item)
+def fields_repr(item, omitted: tuple[str, ...] = ()) -> str:
+    """Standard `repr` of a dataclass object; if longer than `SCREEN`, one line per field with a shortened value.
+
+    The fields `omitted` are left out.
+    """
+    parts = shown_fields(item, omitted)
     name = type(item).__qualname__
     text = f"{name}({', '.join(f'{key}={value!r}' for key, value in parts)})"
     if len(text) <= SCREEN:

@@ -16,13 +16,17 @@ from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.exclusive import exclusive
 from physics.scene.field_errors import raised
 from physics.summary import parts_repr
+from physics.world.parameters import masses_of
 from physics.world.wall_distance import wall_gaps
 from physics.world.world import World
 
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """Energy, momenta and gaps of each body of each world: arrays (worlds, bodies) or (worlds, bodies, 3)."""
+    """Energy, momenta and gaps of each body of each world: arrays (worlds, bodies) or (worlds, bodies, 3).
+
+    Energies and momenta of a fixed body are 0, and its gap is infinite.
+    """
 
     kinetic_energy: np.ndarray  # [J]
     potential_energy: np.ndarray  # [J], of gravity (0 at the origin), contact springs, and fields with a potential
@@ -60,7 +64,8 @@ def diagnose(world: World) -> Diagnostics:
 @exclusive
 def _diagnose(world: World) -> Diagnostics:
     shape = (world.worlds, world.body_count)
-    mass = 1.0 / world.params[:, at.INV_MASS].reshape(shape)
+    is_fixed = np.array([body.fixed for body in world.scene.bodies])
+    mass = np.where(is_fixed, 0.0, masses_of(world.params).reshape(shape))
     angular = world.state[:, at.ANGMOM : at.ANGMOM + 3].reshape(*shape, 3)
     momentum = mass[..., None] * world.linvel
     gaps, which = wall_gaps(world, world.state, world.params)
@@ -77,7 +82,7 @@ def _diagnose(world: World) -> Diagnostics:
         potential_energy=potential,
         momentum=momentum,
         angular_momentum=angular.copy(),
-        gap=np.where(which < 0, np.inf, gaps).reshape(shape),
+        gap=np.where((which < 0).reshape(shape) | is_fixed, np.inf, gaps.reshape(shape)),
     )
 
 
@@ -89,7 +94,7 @@ def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
     wrenches : (worlds * bodies, 6) float64
         Force [N] and torque about the centre of mass [N m], world frame.
     energies : (worlds * bodies,) float64
-        Potential energies [J].
+        Potential energies [J]. Both are 0 for fixed bodies.
     """
     validation.instance(world, World, "world", "a physics.World")
     return exclusive(_look_at)(world)
@@ -106,4 +111,6 @@ def _look_at(world: World) -> tuple[np.ndarray, np.ndarray]:
             )
         except IndexError as error:
             raise raised(error, world.plan.fields) from error
+        is_fixed = np.tile([body.fixed for body in world.scene.bodies], world.worlds)
+        wrenches[is_fixed], energies[is_fixed] = 0.0, 0.0
     return wrenches, energies

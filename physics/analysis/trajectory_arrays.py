@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -87,7 +88,8 @@ def scene_of(parts: Mapping[str, np.ndarray]) -> Scene | None:
 
 
 def _body(kind, mass, inertia, dimensions, center, corners, name) -> Body:
-    given = {"mass": mass, "inertia_body": inertia, "name": name or None}
+    own = {"fixed": True} if mass == math.inf else {"mass": mass, "inertia_body": inertia}
+    given = {**own, "name": name or None}
     if kind == "block":
         return Block([2.0 * half for half in dimensions], center=center, **given)
     if kind == "sphere":

@@ -13,7 +13,7 @@ from typing import Any
 
 from physics.io.scene_places import Places
 from physics.keywords import nearest_first
-from physics.scene.bodies import Block, Ellipsoid, Hull, Sphere
+from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
 from physics.scene.scene import HalfSpace, Scene
@@ -36,6 +36,8 @@ def plain_table(item) -> dict[str, Any]:
     found = {} if isinstance(item, HalfSpace) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
+        if field.name == "mass" and isinstance(item, Body) and item.fixed:
+            continue
         if field.default is MISSING or value != field.default:
             found[field.name] = _plain(value)
     return found

@@ -53,6 +53,15 @@ def _between_row(scene, contact, many) -> Row:
     return Row("body contact", False, "declared without contact between bodies", "")
 
 
+def _fixed_rows(scene) -> tuple[Row, ...]:
+    """Row that names the fixed bodies of a scene; none if it has no fixed body."""
+    fixed = [b for b, body in enumerate(scene.bodies) if body.fixed]
+    if not fixed:
+        return ()
+    reason = f"declared: {'body' if len(fixed) == 1 else 'bodies'} {', '.join(map(str, fixed))}"
+    return (Row("fixed bodies", True, reason, "to the solver walls, with a shape of their own"),)
+
+
 def _own_coefficients(scene, name, pairs, rule, usual) -> str:
     """Text about the coefficients called `name` that bodies, walls and pairs have of their own, and about their rule.
 
@@ -177,6 +186,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
     contact, touching = needs.contact, needs.touching
     return (
         _gravity_row(needs.gravity),
+        *_fixed_rows(scene),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
         _sleeping_row(scene, touching, needs.sleeping),

@@ -65,6 +65,11 @@ else:
     _Shape = object
 
 
+def _body_repr(body: Body) -> str:
+    """`repr` of a body, an expression that makes it again: the infinite mass of a fixed one is left out."""
+    return fields_repr(body, omitted=("mass",) if body.fixed else ())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Body(_Shape):
     """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
@@ -85,11 +90,15 @@ class Body(_Shape):
         which a scene has no friction and no contact. `World.set_parameters` changes them in each world. In a contact of
         two bodies `Friction.rule` and `Contact.restitution_rule` combine both, and at a wall with a coefficient, too.
         At a wall without one the body's own acts.
+    fixed : bool
+        True: the body stays where it is, like a wall of this shape. Other bodies rest on it and hit it; no force moves
+        it. Mass, density and inertia must be left out; the attribute `mass` is then infinite. Velocities must be 0.
 
     Raises
     ------
     ValueError
-        A parameter out of range, not exactly one of mass and density, or a name without printable characters.
+        A parameter out of range, not exactly one of mass and density, or a name without printable characters. A fixed
+        body with a mass, a density, an inertia, a velocity, or a `center` other than 0.
     """
 
     pos: Vector = (0.0, 0.0, 0.0)
@@ -101,14 +110,22 @@ class Body(_Shape):
     name: str | None = None
     friction: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     restitution: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
+    fixed: bool = field(default=False, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
-    _repr_html_ = fields_table
+    def _repr_html_(self) -> str:
+        return fields_table(self, omitted=("mass",) if self.fixed else ())
 
     def __post_init__(self) -> None:
         if type(self) is Body:
             raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
-        self._set_mass()
+        if not isinstance(self.fixed, (bool, np.bool_)):
+            raise ValueError(f"fixed is {shown(self.fixed)}; allowed are True and False")
+        self._set("fixed", bool(self.fixed))
+        if self.fixed:
+            self._check_fixed()
+        else:
+            self._set_mass()
         for name in ("pos", "linvel", "angvel"):
             self._set(name, _tuple(validation.finite(getattr(self, name), (3,), name)))
         self._set("quat", _tuple(validation.unit_quaternion(self.quat, (4,), "quat")))
@@ -118,7 +135,22 @@ class Body(_Shape):
         if self.name is not None:
             check_name(self.name)
         check_coefficients(self)
-        self._check_range()
+        if not self.fixed:
+            self._check_range()
+
+    def _check_fixed(self) -> None:
+        """Raise a ValueError for parameters that a fixed body must not have; set `mass` to infinity."""
+        if self.mass is not None and not self.mass == math.inf:
+            raise ValueError(f"mass is {shown(self.mass)} of a fixed body; allowed is none: leave it out")
+        for name in ("density", "inertia_body"):
+            if getattr(self, name) is not None:
+                raise ValueError(
+                    f"{name} is {shown(getattr(self, name))} of a fixed body; allowed is none: leave it out"
+                )
+        for name in ("linvel", "angvel", "center"):
+            if np.any(validation.finite(getattr(self, name), (3,), name)):
+                raise ValueError(f"{name} is {shown(getattr(self, name))} of a fixed body; allowed is (0, 0, 0)")
+        self._set("mass", math.inf)
 
     def _set_mass(self) -> None:
         """Check mass or density, of which exactly one must be given, and set `mass` [kg]; `density` becomes None."""
@@ -144,7 +176,9 @@ class Body(_Shape):
 
     @property
     def inertia(self) -> NDArray[np.float64]:
-        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
+        """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]; infinite if fixed."""
+        if self.fixed:
+            return np.diag(np.full(3, math.inf))
         if self.inertia_body is not None:
             return np.array(self.inertia_body)
         return np.diag(self.uniform_moments(self.dimensions, self.mass))
@@ -172,7 +206,7 @@ class Block(Body):
     mass: float = FROM_DENSITY
     center: Vector = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
-    __repr__ = fields_repr
+    __repr__ = _body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -190,13 +224,14 @@ class Block(Body):
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,
+            fixed: bool = False,
             center: ArrayLike = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         self._set("size", _tuple(validation.positive(self.size, (3,), "size")))
         self._set("center", _tuple(validation.finite(self.center, (3,), "center")))
-        if any(self.center) and self.inertia_body is None:
+        if any(self.center) and self.inertia_body is None and not self.fixed:
             raise ValueError(
                 f"center is {self.center!r} without inertia_body; give the inertia about the centre of mass"
             )
@@ -243,7 +278,7 @@ class Sphere(Body):
     radius: float
     mass: float = FROM_DENSITY
     kind = "sphere"
-    __repr__ = fields_repr
+    __repr__ = _body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -261,6 +296,7 @@ class Sphere(Body):
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,
+            fixed: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -307,7 +343,7 @@ class Ellipsoid(Body):
     semi_axes: Vector
     mass: float = FROM_DENSITY
     kind = "ellipsoid"
-    __repr__ = fields_repr
+    __repr__ = _body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -325,6 +361,7 @@ class Ellipsoid(Body):
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,
+            fixed: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -382,6 +419,8 @@ class Hull(Body):
     mass: float = FROM_DENSITY
     kind = "hull"
 
+    __repr__ = _body_repr
+
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
         def __init__(
@@ -398,6 +437,7 @@ class Hull(Body):
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,
+            fixed: bool = False,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -406,8 +446,6 @@ class Hull(Body):
             raise ValueError(f"points is {shown(self.points)}; allowed are coordinates below {1 / inertia.LEAST:g}")
         convex_hull(self.points)
         super().__post_init__()
-
-    __repr__ = fields_repr
 
     @property
     def polyhedron(self) -> Polyhedron:
@@ -422,7 +460,9 @@ class Hull(Body):
     @property
     def inertia(self) -> NDArray[np.float64]:
         """(3, 3) inertia tensor about the centre of mass in the body frame [kg m²]."""
-        return np.array(self.inertia_body) if self.inertia_body is not None else self.polyhedron.inertia(self.mass)
+        if self.fixed or self.inertia_body is not None:
+            return super().inertia
+        return self.polyhedron.inertia(self.mass)
 
     @property
     def volume(self) -> float:

@@ -110,6 +110,25 @@ def incline(angle: float, friction: float) -> Scene:
     return Scene([body], [HalfSpace(normal)], [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)])
 
 
+def ramp(angle: float = 0.4, friction: float = 0.2) -> Scene:
+    """A block slides down a fixed ramp, tips over its end, and falls onto a floor.
+
+    The ramp falls along +x by `angle` [rad]; `friction` is the coefficient μ. The ramp is body 1, "ramp".
+    """
+    length, thickness, height, way = 16.0, 1.0, 8.0, 6.0  # of the ramp, of its end above the floor, of the slide [m]
+    down, up = (math.cos(angle), -math.sin(angle)), (math.sin(angle), math.cos(angle))
+    turn = (math.cos(angle / 2), 0.0, 0.0, -math.sin(angle / 2))
+
+    def place(along: float, above: float) -> tuple[float, float, float]:
+        """Point at a distance `along` the ramp before its end and a height `above` it, world frame [m]."""
+        return above * up[0] - along * down[0], height + above * up[1] - along * down[1], 0.0
+
+    block = Block(SIZE, MASS, pos=place(way, SIZE[1] / 2), quat=turn)
+    support = Block((length, thickness, 6.0), pos=place(length / 2, -thickness / 2), quat=turn, fixed=True, name="ramp")
+    effects: list[Effect] = [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)]
+    return Scene([block, support], [HalfSpace((0, 1, 0))], effects)
+
+
 def bounce(height: float = 1.0, restitution: float = 1.0) -> Scene:
     """A block dropped face down on an endless floor without friction.
 
@@ -191,7 +210,7 @@ def football() -> Scene:
 SCENES = {
     function.__name__: function
     for function in (
-        drop, flight, tumble, rest, shove, corner_drop, slide, bounce, rolling_sphere, vertex_drop, closed_box,
+        drop, flight, tumble, rest, shove, corner_drop, slide, ramp, bounce, rolling_sphere, vertex_drop, closed_box,
         tower, heap, football,
     )
 }  # fmt: skip

@@ -39,7 +39,9 @@ class Needs:
     touching : bool
         Whether bodies can touch anything, a wall or another body.
     meeting : bool
-        Whether bodies can touch each other.
+        Whether bodies can touch each other, fixed ones included.
+    fixed : bool
+        Whether some bodies are fixed.
     rubbing : bool
         Whether friction can act.
     rebounding : bool
@@ -56,7 +58,7 @@ class Needs:
     features : int
         Features with which a body may touch a wall: the 8 vertices of a block if the scene has blocks, else 1.
     isotropic : bool
-        Whether every body has three equal moments of inertia.
+        Whether every body that is not fixed has three equal moments of inertia.
     turned : bool
         Whether some body's principal axes are not its body axes; False if `isotropic`.
     uneven : list of int
@@ -74,6 +76,7 @@ class Needs:
     gravity: Gravity | None
     touching: bool
     meeting: bool
+    fixed: bool
     rubbing: bool
     rebounding: bool
     material_columns: int
@@ -114,14 +117,15 @@ def find_needs(scene: Scene) -> Needs:
     """Find the effects that can act in a scene."""
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     kinds = frozenset(body.kind for body in scene.bodies)
-    meeting = contact is not None and contact.between_bodies and len(scene.bodies) > 1
+    fixed = any(body.fixed for body in scene.bodies)
+    meeting = contact is not None and (fixed or (contact.between_bodies and len(scene.bodies) > 1))
     touching = contact is not None and (bool(scene.walls) or meeting)
-    axes = [principal_axes(body.inertia) for body in scene.bodies]
+    axes = [principal_axes(body.inertia) for body in scene.bodies if not body.fixed]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
     return Needs(
-        contact, friction, gravity, touching, meeting,
+        contact, friction, gravity, touching, meeting, fixed,
         rubbing=touching and friction is not None,
         rebounding=touching and has_restitution(scene),
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,

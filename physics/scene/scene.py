@@ -19,6 +19,7 @@ from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coe
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.scene.materials import check_materials
+from physics.scene.springs import check_ends
 from physics.summary import SCREEN, SHOWN_IF_GIVEN, counted, fields_repr, parts_repr, shown
 
 # An axis of friction and the normal of a wall count as parallel if the sine of the angle between them is below this.
@@ -31,6 +32,10 @@ MOST_SHOWN = 12
 NO_CONTACT = (
     "Scene.walls are given, but no effect lets bodies touch them: bodies pass through; add physics.Contact() to "
     "Scene.effects, or leave the walls out"
+)
+FIXED_WITHOUT_CONTACT = (
+    "Scene.bodies holds fixed bodies, but no effect lets others touch them: they pass through; add physics.Contact() "
+    "to Scene.effects, or leave the fixed bodies out"
 )
 
 
@@ -112,7 +117,7 @@ class Scene:
     Parameters
     ----------
     bodies : sequence of Body
-        At least one body. No two bodies may have the same name.
+        At least one body that is not fixed. No two bodies may have the same name.
     walls : sequence of HalfSpace
         Walls, possibly none.
     effects : sequence of effects
@@ -123,7 +128,7 @@ class Scene:
     Warns
     -----
     SceneWarning
-        Walls without `Contact`: bodies pass through them.
+        Walls or fixed bodies without `Contact`: bodies pass through them.
 
     Raises
     ------
@@ -149,6 +154,8 @@ class Scene:
             object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
         if not self.bodies:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")
+        if all(body.fixed for body in self.bodies):
+            raise ValueError("Scene.bodies holds only fixed bodies; allowed is at least one body that is not fixed")
         self._check_names()
         kinds = [type(effect) for effect in self.effects]
         for kind in set(kinds):
@@ -168,6 +175,8 @@ class Scene:
         check_materials(self)
         if self.walls and contact is None:
             warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
+        if contact is None and any(body.fixed for body in self.bodies):
+            warnings.warn(FIXED_WITHOUT_CONTACT, SceneWarning, stacklevel=_frames_of_package())
 
     def __repr__(self) -> str:
         return self._expression() or parts_repr(self)
@@ -222,8 +231,10 @@ class Scene:
         fields = [effect for effect in self.effects if isinstance(effect, Field)]
         for each in fields:
             each.check(len(self.bodies))
+            check_ends(each, self.bodies)
         for b, body in enumerate(self.bodies):
-            unknown = [type(each).__name__ for each in fields if each.needs_axes and body.kind == "hull"]
+            is_free_hull = body.kind == "hull" and not body.fixed
+            unknown = [type(each).__name__ for each in fields if each.needs_axes and is_free_hull]
             if unknown:
                 raise ValueError(
                     f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a hull; allowed with it are "

@@ -5,6 +5,7 @@ Formulas and sources are in `physics.kernels.forces`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -15,6 +16,7 @@ from physics import validation
 from physics.annotations import Frame, Vector
 from physics.kernels.forces import implicit_two_body_spring, spring, two_body_spring
 from physics.keywords import known_keywords
+from physics.rotations import rotation_matrices
 from physics.scene.force_field import Checked, Field
 
 
@@ -22,6 +24,27 @@ def _check_body(effect: Any, body_count: int, name: str) -> None:
     index = getattr(effect, name)
     if index >= body_count:
         raise ValueError(f"{type(effect).__name__}.{name} is {index}; allowed are indices below {body_count}")
+
+
+def check_ends(effect: Any, bodies: Sequence[Any]) -> None:
+    """Raise a ValueError if a spring or a push acts on a fixed body, which no force moves.
+
+    `bodies` are those of the scene. The message about a spring names the anchor in the world that does the same.
+    """
+    if not isinstance(effect, (Spring, Push)):
+        return
+    name, none = type(effect).__name__, "allowed are bodies that are not fixed"
+    other = getattr(effect, "other", None)
+    if bodies[effect.body].fixed:
+        if other is not None and not bodies[other].fixed:
+            none += f": exchange the ends of the spring, with body={other} and an anchor in the world"
+        raise ValueError(f"{name}.body is {effect.body}, a fixed body; {none}")
+    if other is not None and bodies[other].fixed:
+        held = bodies[other]
+        anchor = np.array(held.pos) + rotation_matrices(np.array(held.quat)) @ np.array(effect.anchor)
+        raise ValueError(
+            f"{name}.other is {other}, a fixed body; {none}, or an anchor in the world: anchor={tuple(anchor.tolist())}"
+        )
 
 
 @known_keywords

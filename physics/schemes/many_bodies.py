@@ -12,6 +12,7 @@ from physics.kernels.multibody.data import allocation
 from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
 from physics.kernels.multibody.stepping.step import step_many
 from physics.kernels.state.groups import MultibodySwitches
+from physics.scene.effects import Contact
 from physics.scene.needs import Needs
 from physics.scene.polyhedra import polyhedra
 from physics.scene.scene import Scene
@@ -21,8 +22,16 @@ from physics.schemes.material_tables import pair_materials, wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
 
+def _meetings(scene: Scene, switches: Switches) -> int:
+    """Which bodies may touch each other, as the setting `meet`: 0 none, 1 all, 2 only a moving and a fixed one."""
+    contact = scene.effect(Contact)
+    if contact is None or not switches.meeting:
+        return 0
+    return 1 if contact.between_bodies else 2
+
+
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other; also for bodies at walls that are hulls or tied together by springs.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls at walls, and bodies tied by springs there.
 
     Parameters
     ----------
@@ -40,21 +49,23 @@ class ManyBodies(Scheme):
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls)
-        return is_coupled and is_precise == self.is_error_controlled
+        return (is_coupled or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls and without Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, fixed bodies and Spring between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)
+        fixed = np.array([body.fixed for body in scene.bodies], np.int64) if switches.fixed else None
         return allocation.make_bodies_workspace(
-            bodies, walls, switches.terms, polyhedra(scene.bodies), meet=switches.meeting,
+            bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
+            meet=_meetings(scene, switches),
             wall_materials=wall_materials(scene, switches, True), pair_materials=pair_materials(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),

@@ -63,6 +63,8 @@ class Switches:
         Code of a textbook integrator of free motion (`physics.accuracy.INTEGRATORS`); None: the exact flow.
     meeting : bool
         Whether bodies can touch each other.
+    fixed : True or None
+        Whether some bodies are fixed.
     ellipsoids : True or None
         Whether ellipsoids are among bodies that can touch each other.
     hulls : True or None
@@ -92,6 +94,7 @@ class Switches:
     pivots: bool | None
     integrator: int | None
     meeting: bool
+    fixed: bool | None
     ellipsoids: bool | None
     hulls: bool | None
     sleeping: bool | None

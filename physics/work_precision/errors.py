@@ -58,13 +58,13 @@ def root_mean_square(difference: np.ndarray) -> float:
 def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
     """Sum of kinetic energy and of the potential energy of gravity [J], (samples, bodies); 0 potential at the origin.
 
-    It serves samples of other engines; a `Trajectory` of this engine has its energy. The arguments are
+    It serves samples of other engines; a `Trajectory` of this engine has its energy. A fixed body has none. The arguments are
     (samples, bodies, 3|4|3|3), in the world frame.
     """
     gravity = scene.effect(Gravity)
     pull = np.array(gravity.acceleration if gravity else (0.0, 0.0, 0.0))
-    mass = np.array([body.mass for body in scene.bodies])
-    inertia = np.array([body.inertia for body in scene.bodies])
+    mass = np.array([0.0 if body.fixed else body.mass for body in scene.bodies])
+    inertia = np.array([np.zeros((3, 3)) if body.fixed else body.inertia for body in scene.bodies])
     spin = np.einsum("nbji,nbj->nbi", rotation_matrices(quat), angvel)
     turning = 0.5 * np.einsum("nbi,bij,nbj->nb", spin, inertia, spin)
     return 0.5 * mass * np.sum(linvel * linvel, axis=-1) + turning - mass * (pos @ pull)

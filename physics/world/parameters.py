@@ -22,6 +22,7 @@ from physics.mass.inertia import check_inertia, check_range, principal_axes
 from physics.scene.bodies import Body
 from physics.scene.effects import Contact, Friction, RollingFriction, SpinFriction
 from physics.scene.scene import HalfSpace
+from physics.summary import shown
 
 
 def quaternion_of(R: np.ndarray) -> np.ndarray:
@@ -45,7 +46,7 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
 def write_bodies(params: np.ndarray, bodies: tuple[Body, ...]) -> None:
     """Write mass properties and dimensions of a scene's bodies into `params` (worlds * bodies, PARAM_SIZE)."""
     for b, body in enumerate(bodies):
-        moments, R = principal_axes(body.inertia)
+        moments, R = (np.diag(body.inertia), np.eye(3)) if body.fixed else principal_axes(body.inertia)
         _write_body(
             params[b :: len(bodies)], body, np.array([body.mass]), moments[None], R[None], body.dimensions[None]
         )
@@ -133,17 +134,18 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
     plan : Plan
         Plan of the scene; it decides the inertias that the kernel supports.
     mass : array_like or None
-        Masses [kg], of `shape`.
+        Masses [kg], of `shape`; that of a fixed body must be infinite.
     size : array_like or None
         Edges, or diameters, [m], of `shape` and three numbers.
     inertia_body : array_like or None
-        Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers.
+        Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers; those of fixed
+        bodies are not used.
     shape : tuple of int
         (k, bodies).
     """
-    masses = 1.0 / params[:, at.INV_MASS]
+    masses = masses_of(params)
     if mass is not None:
-        masses = validation.positive(*spread(mass, shape, "mass")).ravel()
+        masses = _new_masses(*spread(mass, shape, "mass"), bodies).ravel()
     halves = params[:, at.DIMENSIONS : at.DIMENSIONS + 3].copy()
     if size is not None:
         halves = 0.5 * validation.positive(*spread(size, (*shape, 3), "size")).reshape(-1, 3)
@@ -156,12 +158,34 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
             _check_spheres(halves[rows])
         if body.kind == "hull":
             _check_hull(b, body, halves[rows])
+        if body.fixed:
+            _write_body(params[rows], body, masses[rows], np.full((1, 3), np.inf), np.eye(3)[None], halves[rows])
+            continue
         given = None if tensors is None else tensors[rows]
         moments, R = _principal_axes(body, masses[rows], halves[rows], given)
         check_range(masses[rows], moments)
         _check_allowed(plan, moments, R)
         _write_body(params[rows], body, masses[rows], moments, R, halves[rows])
     _change_series(params)
+
+
+def masses_of(params: np.ndarray) -> np.ndarray:
+    """Masses [kg] of bodies from their parameters (..., PARAM_SIZE); infinite for fixed bodies."""
+    with np.errstate(divide="ignore"):
+        return 1.0 / params[..., at.INV_MASS]
+
+
+def _new_masses(mass, shape, field, bodies) -> np.ndarray:
+    """Check new masses (k, bodies) [kg]: positive, and infinite for fixed bodies."""
+    fixed = np.array([body.fixed for body in bodies])
+    finite = validation.positive(np.where(fixed & (mass == np.inf), 1.0, mass), shape, field)
+    bad = np.flatnonzero((fixed & (mass != np.inf)).any(axis=0))
+    if len(bad):
+        raise ValueError(
+            f"mass is {shown(mass[0, bad[0]])} for Scene.bodies[{bad[0]}], which is fixed; allowed is inf for it, in an "
+            "array with the masses of all bodies"
+        )
+    return np.where(fixed, np.inf, finite)
 
 
 def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarray]:

@@ -184,7 +184,8 @@ def _check_scene(world: Batch, snapshot: Snapshot) -> None:
 def _check_inertia(world: Batch, snapshot: Snapshot) -> None:
     """Raise a ValueError if a snapshot's bodies need parts of the rotation for which the kernel is not compiled."""
     plan, rows = world.plan, snapshot.arrays[KEPT.index("params")]
-    is_odd = not plan.gyroscopic and not is_isotropic(1.0 / rows[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()
+    moving = rows[rows[:, at.INV_MASS] > 0.0]
+    is_odd = not plan.gyroscopic and not is_isotropic(1.0 / moving[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()
     if not plan.offset_frame:
         is_odd |= bool(rows[:, at.CENTER : at.CENTER + 3].any())
         is_odd |= bool(plan.gyroscopic and rows[:, at.PRINCIPAL + 1 : at.PRINCIPAL + 4].any())

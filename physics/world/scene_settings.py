@@ -41,8 +41,9 @@ def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[s
 
 
 def _body(body) -> str:
-    """Text for a body: its kind, and for a hull a checksum of its corners."""
-    return f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
+    """Text for a body: its kind, for a hull a checksum of its corners, and whether it is fixed."""
+    kind = f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
+    return f"fixed {kind}" if body.fixed else kind
 
 
 def _wall(wall: HalfSpace) -> str:

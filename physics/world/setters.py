@@ -14,6 +14,7 @@ from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.scene.body_names import body_label
 from physics.scene.effects import RESISTANCES, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
+from physics.scene.springs import check_ends
 from physics.summary import shown
 from physics.world import choice, materials, parameters
 from physics.world.batch import Batch
@@ -105,8 +106,26 @@ def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndar
         shape = (len(chosen), world.body_count, size)
         check = validation.unit_quaternion if name == "quat" else validation.finite
         value = check(validation.batch(value, shape, name), shape, name)
+        if name in ("linvel", "angvel"):
+            _check_still(world, chosen, name, value)
         state[:, first : first + size] = value.reshape(-1, size)
     return state
+
+
+def _check_still(world: Batch, chosen, name: str, value: np.ndarray) -> None:
+    """Refuse velocities (k, bodies, 3) of the chosen worlds, called `name`, that are not 0 for a fixed body."""
+    bad = np.argwhere(value.any(axis=-1) & _fixed(world))
+    if len(bad):
+        k, b = bad[0].tolist()
+        raise ValueError(
+            f"{name} is {value[k, b].tolist()} for body {body_label(b, world.names)} in world {int(chosen[k])}, which is "
+            "fixed; allowed is (0, 0, 0)"
+        )
+
+
+def _fixed(world: Batch) -> np.ndarray:
+    """True (bodies,) for fixed bodies."""
+    return np.array([body.fixed for body in world.scene.bodies])
 
 
 def _new_parameters(world: Batch, chosen, rows, given: Mapping) -> np.ndarray:
@@ -178,6 +197,8 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
         order = np.argsort(centres @ SKEW, axis=1, kind="stable")
         centres = np.take_along_axis(centres, order[:, :, None], axis=1)
         apart = np.abs(np.diff(centres, axis=1)).max(axis=2)
+    fixed = _fixed(world)[order]
+    apart[fixed[:, 1:] & fixed[:, :-1]] = np.inf  # fixed bodies may overlap
     radii = np.take_along_axis(radii, order, axis=1)
     bad = np.argwhere(apart <= SAME_PLACE * np.minimum(radii[:, 1:], radii[:, :-1]))
     if len(bad):
@@ -194,7 +215,7 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
 
 
 def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse states with a body deeper inside a wall than allowed.
+    """Refuse states with a body deeper inside a wall than allowed; a fixed body may be at any depth.
 
     Parameters
     ----------
@@ -216,7 +237,7 @@ def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
         return
     gaps, which = wall_gaps(world, state, params)
     allowed = (SOFT_DEPTH if LAW_STIFFNESS in world.plan.laws else START_DEPTH) * params[:, at.RADIUS]
-    bad = np.flatnonzero(gaps < -allowed)
+    bad = np.flatnonzero((gaps < -allowed) & ~np.tile(_fixed(world), len(chosen)))
     if len(bad):
         k = int(bad[0])
         body = body_label(k % world.body_count, world.names)
@@ -270,6 +291,7 @@ def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
                 "(the rest has arguments of its own, or is the same in all worlds)"
             )
         effect.check(world.body_count)
+        check_ends(effect, world.scene.bodies)
         if world.plan.sleeping and not effect.is_steady:
             raise ValueError(
                 f"effects holds {effect!r}, which may change on its own, in a scene in which bodies sleep; allowed is "

@@ -63,7 +63,7 @@ def world_frame(
         return Frame(bodies, walls, goal, text=tuple(text))
     wrench = np.zeros((0, 6)) if applied is None else np.asarray(applied, dtype=float).reshape(-1, 6)
     points, forces = world.contacts(index)
-    first = index * world.body_count
+    first = index * world.body_count + next(b for b, body in enumerate(world.scene.bodies) if not body.fixed)
     strength = float(np.linalg.norm(world.gravity[index])) or UNIT_WEIGHT
     return Frame(
         bodies=bodies,

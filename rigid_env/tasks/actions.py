@@ -205,6 +205,18 @@ class Impulse:
         return (Vector(IMPULSE, self.body, self.axes, float(self.strength), self.frame, point),)
 
 
+def check_movable(acting, bodies) -> None:
+    """Raise a ValueError if an action or disturbance acts on a body that is not in the scene or is fixed.
+
+    `bodies` are those of the scene.
+    """
+    movable = ", ".join(str(b) for b, body in enumerate(bodies) if not body.fixed)
+    if acting.body >= len(bodies):
+        raise ValueError(f"body of {acting!r} is {acting.body}; allowed are {movable}")
+    if bodies[acting.body].fixed:
+        raise ValueError(f"body of {acting!r} is {acting.body}, which is fixed; allowed are {movable}")
+
+
 def check_body(body) -> None:
     """Raise a ValueError unless `body` is an integer of at least 0."""
     if isinstance(body, bool) or not isinstance(body, (int, np.integer)) or body < 0:
@@ -227,7 +239,7 @@ class ActionTable:
     ----------
     ways : sequence of Wrench, Force and Impulse
         Actuations that the task declares, or a single one.
-    body_count : int
+    bodies : sequence of Body
         Bodies of the scene.
 
     Attributes
@@ -249,10 +261,10 @@ class ActionTable:
     Raises
     ------
     ValueError
-        No actuation, an object of another class, or a body that is not in the scene.
+        No actuation, an object of another class, or a body that is not in the scene or is fixed.
     """
 
-    def __init__(self, ways, body_count: int):
+    def __init__(self, ways, bodies):
         ways = tuple(ways) if isinstance(ways, (list, tuple)) else (ways,)
         if not ways or not all(isinstance(way, (Wrench, Force, Impulse)) for way in ways):
             raise ValueError(f"actions is {ways!r}; allowed are Wrench, Force and Impulse, at least one")
@@ -261,8 +273,7 @@ class ActionTable:
         agents: dict[str, Any] = {}
         self.size = 0
         for way in ways:
-            if way.body >= body_count:
-                raise ValueError(f"body of {way!r} is {way.body}; allowed are 0 to {body_count - 1}")
+            check_movable(way, bodies)
             first = self.size
             for vector in way.vectors:
                 places = {axis: self.size + k for k, axis in enumerate(vector.axes)}

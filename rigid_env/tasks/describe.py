@@ -119,7 +119,7 @@ def sections(
 
 def _description(task: Task, documented: type) -> Section:
     scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
-    bodies = "; ".join(f"{_kind(i, body)} of {body.mass:g} kg" for i, body in enumerate(scene.bodies))
+    bodies = "; ".join(f"{_kind(i, body)}{_mass(body)}" for i, body in enumerate(scene.bodies))
     effects = counted(type(effect).__name__ for effect in scene.effects)
     text = f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."
     return Section("Description", tuple(_paragraphs(doc)), after=(text,))
@@ -267,6 +267,10 @@ def _merged(section: Section, part: Part) -> Section:
 
 
 # --- parts of sections ------------------------------------------------------------------------------------------------
+
+
+def _mass(body: Body) -> str:
+    return ", fixed" if body.fixed else f" of {body.mass:g} kg"
 
 
 def _kind(index: int, body: Body) -> str:

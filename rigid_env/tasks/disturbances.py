@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from physics import validation
-from rigid_env.tasks.actions import check_axes, check_body
+from rigid_env.tasks.actions import check_axes, check_body, check_movable
 from rigid_env.tasks.distribution import Distribution
 from rigid_env.tasks.distributions import as_distribution
 from rigid_env.tasks.task_parts import Disturbed
@@ -168,8 +168,7 @@ class Disturbances:
         for kind in self.kinds:
             if not isinstance(kind, (Push, Gust)):
                 raise ValueError(f"disturbances holds {kind!r}; allowed are Push and Gust")
-            if kind.body >= task.world.body_count:
-                raise ValueError(f"body of {kind!r} is {kind.body}; allowed are 0 to {task.world.body_count - 1}")
+            check_movable(kind, task.world.scene.bodies)
         shape = (len(self.kinds), task.worlds)
         self.next, self.end = np.full(shape, NEVER), np.zeros(shape, dtype=np.int64)
         self.force, self.load = np.zeros((*shape, 3)), task.world.no_wrench()

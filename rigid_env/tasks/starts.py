@@ -18,6 +18,7 @@ from physics.parallel.team import listed
 from physics.undo import undo_on_error
 from physics.world.gusts import begin_gusts, gust_phases, reads_time
 from physics.world.materials import wall_coefficients
+from physics.world.parameters import masses_of
 from physics.world.setters import start_anew
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.distribution import Distribution, is_of_user
@@ -174,7 +175,7 @@ class Starts(Declaration):
         world = self.world
         params = world.params.reshape(self.worlds, world.body_count, -1)[rows]
         return {
-            "mass": 1.0 / params[..., at.INV_MASS],
+            "mass": masses_of(params),
             "size": 2.0 * params[..., at.DIMENSIONS : at.DIMENSIONS + 3],
             "friction": params[..., at.FRICTION],
             "restitution": params[..., at.RESTITUTION],
@@ -222,11 +223,11 @@ class Starts(Declaration):
         self.limits[rows] = self._table.limits(weights, reach, self.world.dt)
 
     def _weights(self, rows: np.ndarray) -> np.ndarray:
-        """Weights m g (n, bodies) of the bodies in worlds `rows` [N]."""
+        """Weights m g (n, bodies) of the bodies in worlds `rows` [N]; 0 of fixed ones."""
         gravity = np.linalg.norm(self.world.gravity[rows], axis=1)
         gravity[gravity == 0.0] = UNIT_GRAVITY
-        masses = 1.0 / self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows, :, at.INV_MASS]
-        return masses * gravity[:, None]
+        masses = masses_of(self.world.params.reshape(self.worlds, self.world.body_count, -1)[rows])
+        return np.where(np.isinf(masses), 0.0, masses) * gravity[:, None]
 
     def hold(self, name: str, value) -> None:
         """Hold a drawn value in all worlds, without drawing it again.

@@ -135,7 +135,7 @@ class Task(Starts):
         self.generators: list[np.random.Generator | None] = [None] * self.worlds
         self.episodes = Draws(distributions, self.worlds)
         self.episodes.varying |= self._unlike_scene()
-        self._table = ActionTable(self.actions, self.world.body_count)
+        self._table = ActionTable(self.actions, self.world.scene.bodies)
         self.observed = Observation(self.observation)
         check_views(type(self).__name__, self.observed.views, self.agents)
         self.clock, self._began = 0, np.zeros(self.worlds, dtype=np.int64)

@@ -95,7 +95,7 @@ class Controls:
         Raises
         ------
         ValueError
-            No such body, numbers that are not finite, or a subject whose bodies cannot be dragged.
+            No such body, a fixed one, numbers that are not finite, or a subject whose bodies cannot be dragged.
         """
         self._needs("drag")
         self._run.give("drag", self._body(body), _vector(point_body, "point_body"), _vector(target, "target"))
@@ -111,7 +111,10 @@ class Controls:
         self._run.give("kick", self._body(body), _vector(impulse, "impulse"))
 
     def _body(self, body: int) -> int:
-        return validation.index(body, self.subject.world.body_count, "body")
+        index = validation.index(body, self.subject.world.body_count, "body")
+        if self.subject.world.scene.bodies[index].fixed:
+            raise ValueError(f"body is {index}, which is fixed; allowed are bodies that are not")
+        return index
 
     # --- sliders -----------------------------------------------------------------------------------------------
 

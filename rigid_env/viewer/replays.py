@@ -120,8 +120,8 @@ class PlayedTrajectory(Subject):
         self.name, self._trajectory, self._sample = name, trajectory, 0
         self._bodies = self.scene.bodies
         self._events = sorted(trajectory.events, key=lambda event: event.t)
-        self._mass = np.array([body.mass for body in self._bodies])
-        self._inertia = np.array([body.inertia for body in self._bodies])
+        self._mass = np.array([0.0 if body.fixed else body.mass for body in self._bodies])
+        self._inertia = np.array([np.zeros((3, 3)) if body.fixed else body.inertia for body in self._bodies])
         self._radius = np.array([_radius(body) for body in self._bodies])
         walls = self.scene.walls if self.scene.effect(Contact) else ()
         self._walls = tuple(WallView(wall.normal, wall.offset) for wall in walls)

@@ -135,14 +135,19 @@ class Viewer:
         session = self._session
         if phase == "end":
             self._inbox.put(session.release)
-        else:
+        elif not _is_fixed(session, body):
             arm = point + session.subject.world.params[body, at.CENTER : at.CENTER + 3]  # from the centre of mass
             self._inbox.put(lambda: session.drag(body, arm, target))
 
     def _clicked(self, body: int, _point: np.ndarray, direction: np.ndarray) -> None:
         session, speed = self._session, self._panel.kick_speed
-        if speed > 0.0:
+        if speed > 0.0 and not _is_fixed(session, body):
             self._inbox.put(lambda: session.kick(body, speed * _mass(session, body) * direction))
+
+
+def _is_fixed(session: Session, body: int) -> bool:
+    """True if a body is fixed: it can be neither dragged nor kicked."""
+    return session.subject.world.scene.bodies[body].fixed
 
 
 def _mass(session: Session, body: int) -> float:

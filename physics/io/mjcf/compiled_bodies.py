@@ -10,7 +10,7 @@ import numpy as np
 
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, Pose
-from physics.io.mjcf.shapes import Placed, make_body
+from physics.io.mjcf.shapes import Placed, make_body, make_fixed
 from physics.io.mjcf.text import ModelError
 from physics.io.mjcf.touching import Touching
 from physics.io.mjcf.writer import unnamed
@@ -57,6 +57,39 @@ def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[BodyEle
             found.append(_free_body(model, touching, root, number))
         except ModelError as error:
             left.add(error)
+    return found
+
+
+class FixedElement(NamedTuple):
+    """Fixed body of a scene, with the numbers of its body and its geom in the model."""
+
+    root: int
+    geom: int
+    body: Body
+
+
+def fixed_bodies(model: Model, geoms: list[int], left: LeftOut) -> list[FixedElement]:
+    """Convert fixed geoms to fixed bodies; errors go to `left`.
+
+    A fixed body has the name of its geom, or that of the model's body if this has no other geom.
+    """
+    m, found = model.data, []
+    for geom in geoms:
+        root, frame = int(m.geom_bodyid[geom]), model.geom_frames[geom]
+        kind = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom])
+        is_only = root > 0 and m.body_geomnum[root] == 1
+        name = model.name("geom", geom) or (model.name("body", root) if is_only else "")
+        if kind == "mesh":
+            frame = model.frames[root]
+            shape = (_points(model, geom) - frame.pos) @ frame.R
+        else:
+            shape = _half_axes(kind, m.geom_size[geom])
+        pose = np.concatenate((frame.pos, frame.quat))
+        try:
+            body = make_fixed(kind, shape, pose, None if name in ("", unnamed(root - 1)) else name)
+            found.append(FixedElement(root, geom, body))
+        except ValueError as error:
+            left.add(model.error("geom", geom, f"in a scene: {error}"))
     return found
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from physics.io.mjcf import forces
-from physics.io.mjcf.compiled_bodies import BodyElements, free_bodies
+from physics.io.mjcf.compiled_bodies import SHAPES, fixed_bodies, free_bodies
 from physics.io.mjcf.contacts import FoundContact, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, compile_model
@@ -44,28 +44,30 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
         raise ModelError(f"there is no free body that a scene can hold; allowed is at least one{told}")
     for error in forces.joint_faults(model, free):
         left.add(error)
-    planes, contact = _contact(model, touching, free, left)
+    surfaces = [touching.surface(each.geom) for each in free]
+    met = _met_geoms(model, touching, dict.fromkeys(surfaces), left)
+    planes = [geom for geom in met if _kind(model, geom) == "plane"]
+    fixed = fixed_bodies(model, [geom for geom in met if geom not in planes], left)
+    order = sorted(range(len(free) + len(fixed)), key=[each.root for each in (*free, *fixed)].__getitem__)
+    ends = [order.index(k) for k in range(len(order))]
+    ends[len(free) : len(free)] = [-1 - k for k in range(len(planes))]
+    still = [touching.surface(geom) for geom in (*planes, *(each.geom for each in fixed))]
+    contact = find_contact(surfaces, still, left, touching.friction_of, ends)
     fields = forces.damping(model, free, left)
     effects = [*forces.gravity(model, free, left), *contact.effects, *fields]
-    bodies = [replace(each.body, friction=mu) for each, mu in zip(free, contact.bodies)]
-    names = {body.name for body in bodies}
-    walls = [_wall(model, k, plane, mu, names) for k, (plane, mu) in enumerate(zip(planes, contact.planes))]
-    return Scene(bodies, walls, effects)
+    own = [*contact.bodies, *contact.still[len(planes) :]]
+    bodies = [replace((*free, *fixed)[k].body, friction=own[k]) for k in order]
+    if contact.effects:
+        for error in touching.faults([*planes, *(each.geom for each in (*free, *fixed))]):
+            left.add(error)
+    return Scene(bodies, _walls(model, planes, contact, {body.name for body in bodies}), effects)
 
 
-def _contact(
-    model: Model, touching: Touching, free: list[BodyElements], left: LeftOut
-) -> tuple[list[int], FoundContact]:
-    """Find the numbers of the plane geoms that are walls, and the contact of bodies with them and each other."""
-    bodies = [touching.surface(each.geom) for each in free]
-    met = _met_planes(model, touching, dict.fromkeys(bodies), left)
-    found = find_contact(bodies, [touching.surface(plane) for plane in met], left, touching.friction_of)
-    if not found.effects:
-        planes = [g for g in _fixed_geoms(model) if _kind(model, g) == "plane"]
-        return planes, found._replace(planes=[None] * len(planes))
-    for error in touching.faults([*met, *(each.geom for each in free)]):
-        left.add(error)
-    return met, found
+def _walls(model: Model, met: list[int], contact: FoundContact, taken: set) -> list[HalfSpace]:
+    """Make the walls of the planes that a body can touch; without contact of all planes."""
+    planes = met if contact.effects else [g for g in _fixed_geoms(model) if _kind(model, g) == "plane"]
+    frictions = contact.still[: len(met)] if contact.effects else [None] * len(planes)
+    return [_wall(model, k, plane, mu, taken) for k, (plane, mu) in enumerate(zip(planes, frictions))]
 
 
 def _kind(model: Model, geom: int) -> str:
@@ -77,17 +79,18 @@ def _fixed_geoms(model: Model) -> list[int]:
     return [g for g in range(m.ngeom) if not model.moves(int(m.geom_bodyid[g]))]
 
 
-def _met_planes(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
-    """Numbers of the fixed plane geoms that a body can touch; other fixed geoms that touch bodies go to `left`."""
+def _met_geoms(model: Model, touching: Touching, bodies: dict, left: LeftOut) -> list[int]:
+    """Numbers of the fixed geoms that a body can touch; those that a scene cannot hold go to `left`."""
     met = []
     for geom in _fixed_geoms(model):
         if not touched(touching.surface(geom), bodies, touching.friction_of):
             continue
         body, kind = int(model.data.geom_bodyid[geom]), _kind(model, geom)
-        if kind != "plane":
-            left.add(model.error("geom", geom, f"is a fixed {kind}; allowed of the world are planes"))
+        if kind not in ("plane", *SHAPES):
+            allowed = ", ".join(("plane", *SHAPES))
+            left.add(model.error("geom", geom, f"is a fixed {kind}; allowed of the world are {allowed}"))
         elif model.data.body_mocapid[body] >= 0:
-            left.add(model.error("geom", geom, "is a plane that is moved by mocap; allowed are planes that stay"))
+            left.add(model.error("geom", geom, f"is a {kind} that is moved by mocap; allowed are geoms that stay"))
         else:
             met.append(geom)
     return met

@@ -80,65 +80,71 @@ def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf
 
 
 class FoundContact(NamedTuple):
-    """Contact of a model in a scene's terms: its effects, and the frictions that bodies and walls have of their own."""
+    """Contact of a model in a scene's terms: its effects, and the frictions that its parts have of their own."""
 
     effects: list[Any]
     bodies: list[float | None]
-    planes: list[float | None]
+    still: list[float | None]
 
 
 def find_contact(
     bodies: Sequence[Surface],
-    planes: Sequence[Surface],
+    still: Sequence[Surface],
     left: LeftOut,
     friction_of: FrictionOf = dynamic_friction,
+    ends: Sequence[int] | None = None,
 ) -> FoundContact:
     """Find the effects `Contact` and `Friction` of a scene, none if nothing touches, and the frictions of its parts.
 
     Parameters
     ----------
-    bodies, planes : sequence of Surface
-        Surfaces of the bodies, and of the walls.
+    bodies, still : sequence of Surface
+        Surfaces of the bodies that move, and of the walls and fixed bodies.
     left : LeftOut
         Collects a message where only some pairs touch; in the scene all do.
     friction_of : callable
         Returns the friction coefficient of two surfaces, or None if they do not touch.
+    ends : sequence of int, optional
+        Numbers of `bodies` and of `still` in the scene, -1 - k for wall k. None: `still` are the walls.
     """
     number = Counter(bodies)
-    at_planes = [_Met(a, b, friction_of(a, b)) for a in number for b in dict.fromkeys(planes)]
+    at_still = [_Met(a, b, friction_of(a, b)) for a in number for b in dict.fromkeys(still)]
     between = [
         _Met(a, b, friction_of(a, b)) for a, b in combinations_with_replacement(number, 2) if a != b or number[a] > 1
     ]
-    none = FoundContact([], [None] * len(bodies), [None] * len(planes))
-    meet_planes = _agreed_contact(at_planes, left)
+    none = FoundContact([], [None] * len(bodies), [None] * len(still))
+    meet_still = _agreed_contact(at_still, left)
     meet_bodies = _agreed_contact(between, left)
-    if not meet_planes and not meet_bodies:
+    if not meet_still and not meet_bodies:
         return none
     if len(bodies) == 1:  # there is no other body: decide as if there were a second one with the same masks
         meet_bodies = friction_of(bodies[0], bodies[0]) is not None
     contact = Contact(between_bodies=meet_bodies)
-    found = {pair.friction for pair in at_planes + between if pair.friction is not None}
+    found = {pair.friction for pair in at_still + between if pair.friction is not None}
     if len(found) == 1:
         friction = [Friction(mu) for mu in found if mu > 0]
         return none._replace(effects=[contact, *friction])
-    own = [max(LEAST_FRICTION, surface.friction) for surface in (*bodies, *planes)]
-    effect = Friction(max(found), rule="maximum", pairs=_exceptions(bodies, planes, meet_bodies, friction_of))
+    own = [max(LEAST_FRICTION, surface.friction) for surface in (*bodies, *still)]
+    if ends is None:
+        ends = [*range(len(bodies)), *(-1 - k for k in range(len(still)))]
+    parts = list(zip(ends, (*bodies, *still)))
+    pairs = _exceptions(parts[: len(bodies)], parts[len(bodies) :], meet_bodies, friction_of)
+    effect = Friction(max(found), rule="maximum", pairs=pairs)
     return FoundContact([contact, effect], own[: len(bodies)], own[len(bodies) :])
 
 
-def _exceptions(bodies, planes, meet_bodies: bool, friction_of: FrictionOf) -> list[tuple[int, int, float]]:
-    """Pairs (body, body or -1 - wall, friction) that touch with another friction than the larger of their surfaces.
+def _exceptions(bodies, still, meet_bodies: bool, friction_of: FrictionOf) -> list[tuple[int, int, float]]:
+    """Pairs (end, end, friction) that touch with another friction than the larger of their surfaces.
 
-    A plane that only some bodies touch, or a pair of bodies that pass through each other, keeps the larger one.
+    `bodies` and `still` hold an end and a surface each. A plane that only some bodies touch, or a pair of bodies that
+    pass through each other, keeps the larger one.
     """
     pairs = []
-    for i, a in enumerate(bodies):
-        others = [(-1 - k, plane) for k, plane in enumerate(planes)]
-        others += list(enumerate(bodies))[i + 1 :] if meet_bodies else []
-        for j, b in others:
+    for i, (end, a) in enumerate(bodies):
+        for other, b in [*still, *(bodies[i + 1 :] if meet_bodies else [])]:
             mu = friction_of(a, b)
             if mu is not None and mu != max(LEAST_FRICTION, a.friction, b.friction):
-                pairs.append((i, j, mu))
+                pairs.append((end, other, mu))
     return pairs
 
 

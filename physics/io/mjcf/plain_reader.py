@@ -13,7 +13,7 @@ import numpy as np
 from physics import validation
 from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.shapes import Placed, make_body
+from physics.io.mjcf.shapes import Placed, make_body, make_fixed
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.io.mjcf.writer import unnamed, wall_name
 from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
@@ -76,10 +76,13 @@ def read_scene(root: Element) -> Scene:
     for plane in planes:
         if _type(plane) != "plane":
             raise _unread(plane, f"of the world is a {_type(plane)}; allowed are planes")
-    elements = world.findall("body")
+    elements, is_free = world.findall("body"), [_has_joint(body) for body in world.findall("body")]
     meshes = {mesh.get("name"): mesh for mesh in root.iterfind("asset/mesh")}
-    starts = _starts(root, elements)
-    bodies = [_body(b, element, meshes, *start) for b, (element, start) in enumerate(zip(elements, starts))]
+    starts = iter(_starts(root, [element for element, free in zip(elements, is_free) if free]))
+    bodies = [
+        _body(b, element, meshes, *next(starts)) if free else _fixed_body(b, element, meshes)
+        for b, (element, free) in enumerate(zip(elements, is_free))
+    ]
     option = root.find("option")
     gravity = _numbers(root if option is None else option, "gravity", 3, DEFAULT_GRAVITY)
     effects = [Gravity(gravity)] if gravity.any() else []
@@ -87,20 +90,28 @@ def read_scene(root: Element) -> Scene:
     geoms = [*(element.find("geom") for element in elements), *planes]
     names, told = [geom.get("name") for geom in geoms], {name for pair in pairs for name in pair}
     # only a listed geom has a number: surfaces of all others are equal if their properties are
-    every = [_surface(geom, k if names[k] in told else -1) for k, geom in enumerate(geoms)]
-    surfaces, floors = every[: len(elements)], every[len(elements) :]
+    surfaces = [_surface(geom, k if names[k] in told else -1) for k, geom in enumerate(geoms)]
 
     def friction_of(a: Surface, b: Surface) -> float | None:
         listed = pairs.get(frozenset((names[a.geom], names[b.geom]))) if a.geom >= 0 and b.geom >= 0 else None
         return dynamic_friction(a, b) if listed is None else listed
 
-    met = [k for k, floor in enumerate(floors) if touched(floor, surfaces, friction_of)]
-    contact = find_contact(surfaces, [floors[k] for k in met], LeftOut(), friction_of)
-    bodies = [replace(body, friction=mu) for body, mu in zip(bodies, contact.bodies)]
-    met, frictions = (met, contact.planes) if contact.effects else (list(range(len(planes))), [None] * len(planes))
+    free = [b for b, moves in enumerate(is_free) if moves]
+    is_met = [touched(surface, [surfaces[b] for b in free], friction_of) for surface in surfaces]
+    walls = [k for k in range(len(elements), len(geoms)) if is_met[k]]
+    fixed = [b for b, moves in enumerate(is_free) if not moves and is_met[b]]
+    kept = sorted(free + fixed)  # a fixed body that no other one can touch is left out
+    ends = [*map(kept.index, free), *(-1 - k for k in range(len(walls))), *map(kept.index, fixed)]
+    contact = find_contact(
+        [surfaces[b] for b in free], [surfaces[k] for k in walls + fixed], LeftOut(), friction_of, ends
+    )
+    if not contact.effects:
+        kept, walls = list(range(len(bodies))), list(range(len(elements), len(geoms)))
+    own = dict(zip([*free, *walls, *fixed], [*contact.bodies, *contact.still])) if contact.effects else {}
+    bodies = [replace(bodies[b], friction=own.get(b)) for b in kept]
     taken = {body.name for body in bodies}
-    walls = [_wall(k, planes[plane], mu, taken) for k, (plane, mu) in enumerate(zip(met, frictions))]
-    return Scene(bodies, walls, effects + contact.effects)
+    half_spaces = [_wall(k, geoms[wall], own.get(wall), taken) for k, wall in enumerate(walls)]
+    return Scene(bodies, half_spaces, effects + contact.effects)
 
 
 def _listed_pairs(root: Element) -> dict[frozenset[str], float]:
@@ -240,6 +251,36 @@ def _starts(root: Element, elements: list[Element]) -> list[tuple[np.ndarray, np
     return list(zip(poses, velocities))
 
 
+def _has_joint(element: Element) -> bool:
+    """True if a body element has a joint; else it is fixed."""
+    return element.find("freejoint") is not None or element.find("joint") is not None
+
+
+def _fixed_body(b: int, element: Element, meshes: dict) -> Body:
+    """Make a fixed body from body element number `b`, which has no joint."""
+    geom, kind, shape = _only_geom(element, meshes)
+    pose = np.concatenate((_numbers(element, "pos", 3, "0 0 0"), _unit(element)))
+    arm = _numbers(geom, "pos", 3, "0 0 0")
+    pose[:3] += rotation_matrices(pose[3:]) @ arm
+    name = element.get("name")
+    try:
+        return make_fixed(kind, shape, pose, None if name in (None, "", unnamed(b)) else name)
+    except ValueError as error:
+        raise _error(element, f"in a scene: {error}") from None
+
+
+def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray]:
+    """Find the only geom of a body element: the geom, its kind, and its half axes or points [m]."""
+    geoms = element.findall("geom")
+    if len(geoms) != 1:
+        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
+    geom, kind = geoms[0], _type(geoms[0])
+    if kind not in SHAPES:
+        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
+    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    return geom, kind, _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
+
+
 def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np.ndarray) -> Body:
     """Make the scene's body from body element number `b`, its pose (7,) and velocity (6,) at the start.
 
@@ -248,14 +289,7 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")
-    geoms = element.findall("geom")
-    if len(geoms) != 1:
-        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
-    geom, kind = geoms[0], _type(geoms[0])
-    if kind not in SHAPES:
-        raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
-    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
-    shape = _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
+    geom, kind, shape = _only_geom(element, meshes)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
     name = element.get("name")
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -70,6 +71,24 @@ def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str 
     if placed.kind == "mesh":
         return _hull(placed, start)
     return _convex(placed, start)
+
+
+def make_fixed(kind: str, shape: np.ndarray, pose: np.ndarray, name: str | None) -> Body:
+    """Make a fixed body from a geom of the world; arguments as of `make_body`, with `shape` as in `Placed`.
+
+    The points of a mesh are relative to the origin of `pose`.
+    """
+    start: dict[str, Any] = {"quat": pose[3:], "name": name, "fixed": True}
+    if kind == "mesh":
+        fault = _hull_fault(points := tuple(map(tuple, shape.tolist())))
+        if fault:
+            raise ValueError(fault)
+        hull = Hull(points, **start)
+        return replace(hull, pos=pose[:3] + rotation_matrices(pose[3:]) @ hull.centroid)
+    start["pos"] = pose[:3]
+    if kind == "box":
+        return Block(tuple(2 * shape), **start)
+    return Sphere(float(shape[0]), **start) if kind == "sphere" else Ellipsoid(tuple(shape), **start)
 
 
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:

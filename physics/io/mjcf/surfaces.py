@@ -7,6 +7,7 @@ MuJoCo knows no other rule than the maximum. So the pairs for which a scene's ru
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 from physics.compiler.decorators import plain_function
 from physics.kernels.contact_law.materials import RULES, combine
@@ -54,16 +55,19 @@ class Frictions:
 
         Items are (body, other body or -1 - wall, coefficient).
         """
-        contact, count = self._scene.effect(Contact), len(self.bodies)
+        contact, bodies = self._scene.effect(Contact), self._scene.bodies
         if contact is None:
             return
-        for body in range(count):
-            others = [-1 - k for k in range(len(self.walls))]
-            others += range(body + 1, count if contact.between_bodies else 0)
-            for other in others:
-                mu = self.of_pair(body, other)
-                if mu != max(self.bodies[body], self.bodies[other] if other >= 0 else self.walls[-1 - other]):
-                    yield body, other, mu
+        ends = [*(-1 - k for k in range(len(self.walls))), *range(len(bodies))]
+        for body, other in product(range(len(bodies)), ends):
+            if bodies[body].fixed and (other < 0 or bodies[other].fixed):
+                continue
+            is_pair_of_moving = other >= 0 and not (bodies[body].fixed or bodies[other].fixed)
+            if 0 <= other <= body or (is_pair_of_moving and not contact.between_bodies):
+                continue
+            mu = self.of_pair(body, other)
+            if mu != max(self.bodies[body], self.bodies[other] if other >= 0 else self.walls[-1 - other]):
+                yield body, other, mu
 
     @property
     def is_none(self) -> bool:

@@ -145,12 +145,16 @@ def _surface(mu: float, frictions: Frictions) -> dict[str, str]:
 
 
 def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:
-    """Add the element of body number `b`, a free body in the frame of the scene's body, and sites for its springs."""
+    """Add the element of body number `b` in the frame of the scene's body, and sites for its springs.
+
+    A fixed body has no joint, and touches the others as a plane does.
+    """
     element = ET.SubElement(world, "body", name=body.name or unnamed(b), pos=_text(body.pos), quat=_text(body.quat))
-    ET.SubElement(element, "freejoint")
-    I = body.inertia
-    full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
-    ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
+    if not body.fixed:
+        ET.SubElement(element, "freejoint")
+        I = body.inertia
+        full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
+        ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
     shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
@@ -158,6 +162,8 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
         "contype": str(int(contact is not None)),
         "conaffinity": str(int(bool(contact and contact.between_bodies))),
     }
+    if body.fixed:
+        touch = {"contype": "0", "conaffinity": str(int(contact is not None))}
     ET.SubElement(element, "geom", **shape, **touch, **surface)
     for k, spring in enumerate(springs):
         if spring.body == b:
@@ -179,7 +185,8 @@ def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> 
 
 
 def _add_keyframe(root: ET.Element, scene: Scene) -> None:
-    qpos = [(*body.pos, *body.quat) for body in scene.bodies]
-    qvel = [(*body.linvel, *(rotation_matrices(np.array(body.quat)).T @ body.angvel)) for body in scene.bodies]
+    moving = [body for body in scene.bodies if not body.fixed]
+    qpos = [(*body.pos, *body.quat) for body in moving]
+    qvel = [(*body.linvel, *(rotation_matrices(np.array(body.quat)).T @ body.angvel)) for body in moving]
     keys = ET.SubElement(root, "keyframe")
     ET.SubElement(keys, "key", name=KEYFRAME, qpos=_text(qpos), qvel=_text(qvel))

@@ -23,6 +23,7 @@ from physics.kernels.forces.spring import implicit_spring_stiffness, spring_vect
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import apply_inv_inertia, principal_attitude
+from physics.kernels.state.fixed_body import is_fixed
 
 # Columns of a spring between two bodies, in the parameters of each of them. Columns 0 to 8 are those of a spring to a
 # fixed anchor (`spring`); the anchor is the other body's point now. These follow:
@@ -133,15 +134,18 @@ def hold_implicit_loads(first, count, h, offset_frame, bodies):
     the loads at both of its ends, one spring after the other. Own fields soften the loads of springs last: a damper
     leaves little of its own load, so even a small share taken from one body before that would be relatively large.
     """
-    for b in range(bodies.shape[0]):
-        _hold_unsoftened_springs(bodies[b], h, offset_frame)
-    for b in range(bodies.shape[0]):
+    records = bodies.body
+    for b in range(records.shape[0]):
+        if not is_fixed(b, bodies):
+            _hold_unsoftened_springs(records[b], h, offset_frame)
+    for b in range(records.shape[0]):
         for k in range(first, first + LINK_SIZE * count, LINK_SIZE):
-            j = int(bodies[b].columns[k + LINK_OTHER])
+            j = int(records[b].columns[k + LINK_OTHER])
             if j > b:  # each spring once
-                _soften_pair(k, bodies[b], bodies[j], h, offset_frame)
-    for b in range(bodies.shape[0]):
-        _soften_springs(bodies[b], h, offset_frame)
+                _soften_pair(k, records[b], records[j], h, offset_frame)
+    for b in range(records.shape[0]):
+        if not is_fixed(b, bodies):
+            _soften_springs(records[b], h, offset_frame)
 
 
 @kernel
@@ -150,13 +154,15 @@ def note_world_rates(h, offset_frame, bodies):
 
     Stiff means too long for the explicit midpoint rule.
     """
-    stiff = 0
-    for b in range(bodies.shape[0]):
-        body, state = bodies[b], middle_field_state(bodies[b], 0.5 * h, offset_frame)
+    stiff, records = 0, bodies.body
+    for b in range(records.shape[0]):
+        if is_fixed(b, bodies):
+            continue
+        body, state = records[b], middle_field_state(records[b], 0.5 * h, offset_frame)
         x, q, v, L = read_middle(body)
         loads = total_load(state, body.now + 0.5 * h, body)
         note_field_rates(state, kicked_state(x, q, v, L, loads, h, h, offset_frame, body), h, body)
-        stiff = max(stiff, bodies[b].is_stiff)
-    for b in range(bodies.shape[0]):
-        bodies[b].is_stiff = stiff
+        stiff = max(stiff, records[b].is_stiff)
+    for b in range(records.shape[0]):
+        records[b].is_stiff = stiff
     return stiff == 1

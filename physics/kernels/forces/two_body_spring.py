@@ -38,6 +38,7 @@ from physics.kernels.math.union_find import unite_sets
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
+from physics.kernels.state.fixed_body import is_fixed
 
 
 @inlined
@@ -167,18 +168,22 @@ def hold_linked_loads(first, count, h, gyroscopic, offset_frame, bodies):
     """
     records, half = bodies.body, 0.5 * h
     for b in range(records.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         x, q, v, L = read_state(bodies.state, b)
         q = drift_attitude(q, L, records[b], half, gyroscopic, offset_frame)
         write_middle(records[b], (plus(x, times(half, v)), q, v, L))
     _put_anchors(first, count, offset_frame, records)
-    if note_world_rates(h, offset_frame, records):
-        hold_implicit_loads(first, count, h, offset_frame, records)
+    if note_world_rates(h, offset_frame, bodies):
+        hold_implicit_loads(first, count, h, offset_frame, bodies)
         return True
     for b in range(records.shape[0]):
-        if bodies.touched[b] == 0:
+        if bodies.touched[b] == 0 and not is_fixed(b, bodies):
             _kick(records[b], half, offset_frame)
     _put_anchors(first, count, offset_frame, records)
     for b in range(records.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         x, q, v, L = read_middle(records[b])
         F, T = field_load(x, q, v, L, records[b].now + half, offset_frame, records[b])
         apply_loads(F, T, records[b])

@@ -24,6 +24,7 @@ from physics.kernels.forces.two_body_spring import place_anchors_now
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, times
 from physics.kernels.state.body import angular_velocity, kinetic_energy, read_state, write_state
+from physics.kernels.state.fixed_body import is_fixed
 
 
 @inlined
@@ -47,7 +48,8 @@ def _potential(later, offset_frame, bodies):
     place_anchors_now(offset_frame, bodies)
     total = 0.0
     for b in range(bodies.body.shape[0]):
-        total += potential_energy(read_state(bodies.state, b), later, offset_frame, bodies.body[b])
+        if not is_fixed(b, bodies):
+            total += potential_energy(read_state(bodies.state, b), later, offset_frame, bodies.body[b])
     return total
 
 
@@ -96,6 +98,8 @@ def _common_velocities(ties, bodies):
     """
     mass, p, start = 0.0, ZERO, ZERO
     for b in range(bodies.body.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         m = bodies.body[b].mass
         mass, p = mass + m, plus(p, times(m, read_state(bodies.state, b)[2]))
         start = plus(start, times(m, _start(bodies.body[b])[2]))
@@ -114,6 +118,8 @@ def _take(gain, ties, offset_frame, bodies):
     c, start = _common_velocities(ties, bodies)
     motion = 0.0
     for b in range(bodies.body.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         _, q, v, L = read_state(bodies.state, b)
         motion += kinetic_energy(q, minus(v, c), L, bodies.body[b], offset_frame)
     if gain > UNRESOLVED_GAIN_SHARE * motion:
@@ -122,6 +128,8 @@ def _take(gain, ties, offset_frame, bodies):
     s = math.sqrt(1.0 - gain / motion) if gain < motion else 0.0
     new = c if gain < motion else start
     for b in range(bodies.body.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         x, q, v, L = read_state(bodies.state, b)
         if not gain < motion:
             bodies.body[b].is_put_back = 1
@@ -140,6 +148,8 @@ def limit_world_energy_gain(h, ties, offset_frame, bodies, first):
     high = _potential(h, offset_frame, bodies)
     gain, size = high - first.stage_energy, abs(high) + abs(first.stage_energy)
     for b in range(bodies.body.shape[0]):
+        if is_fixed(b, bodies):
+            continue
         more, measure = _gain_of(b, h, offset_frame, bodies)
         gain, size = gain + more, size + measure
     if gain > ENERGY_ROUNDING * size:

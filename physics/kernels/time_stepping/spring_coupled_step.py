@@ -50,6 +50,7 @@ class LinkedWorld(NamedTuple):
     room: np.ndarray  # states and rates of `spring_coupled_extrapolation`
     tolerance: float  # largest error of a step of `spring_coupled_extrapolation`
     most: int  # largest number of such steps in one substep
+    fixed: None = None  # no body is fixed (`state.fixed_body`)
 
 
 def make_linked_world(

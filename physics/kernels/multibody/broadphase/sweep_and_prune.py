@@ -17,6 +17,7 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.grid import body_strips, fill_columns
 from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
+from physics.kernels.multibody.data.fixed_bodies import may_form_pair
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
 # Bound of the factor by which growing spin moves points farther than the initial spin would (`surface_motion_bound`).
@@ -170,7 +171,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
         b = many.broadphase.entry[k]
         if box[b, axis] > box[a, axis + 3]:
             break
-        if not _overlap(a, b, many):
+        if not (_overlap(a, b, many) and may_form_pair(a, b, many)):
             continue
         a_i, _, a_j, _ = body_strips(a, u, v, cuts, many)
         b_i, _, b_j, _ = body_strips(b, u, v, cuts, many)
@@ -223,7 +224,7 @@ def _sort_pairs(count, many):
 def find_pairs(h, many):
     """Find all near pairs within h [s]: write `many.broadphase.pairs` and their number `many.counts[NUM_PAIRS]`.
 
-    A near pair is two bodies a < b whose swept boxes overlap. Pairs are sorted by a, then by b.
+    A near pair is two bodies a < b that may touch and whose swept boxes overlap. Pairs are sorted by a, then by b.
     """
     write_swept_boxes(h, many)
     axis = widest_axis(many)

@@ -55,7 +55,7 @@ def bodies_setting_fields() -> list[tuple]:
         ("substep", f),  # length of the substep [s]; under error control of the present part of it
         ("load_speed", f),  # largest speed that the loads of a resting stage give a body [m/s], else 0
         ("is_resting_stage", i),  # 1: solve of a resting stage without error control; 0: any other solve
-        ("meet", i),  # 1: bodies touch each other, 0: walls only
+        ("meet", i),  # 1: bodies touch each other; 2: moving bodies touch only fixed ones; 0: walls only
         ("is_sequential", i),  # 1: colliding contacts are resolved one after the other
         ("is_error_controlled", i),  # 1: steps have an error tolerance
     ]
@@ -99,10 +99,11 @@ def make_bodies_workspace(
     walls: np.ndarray,
     terms: tuple[Term, ...] = (),
     polyhedra: Sequence = (),
+    fixed: np.ndarray | None = None,
     *,
     wall_materials: WallMaterials | None = None,
     pair_materials: PairMaterials | None = None,
-    meet=True,
+    meet=1,
     is_sequential=False,
     is_error_controlled=False,
     relative_slop: float,
@@ -120,12 +121,14 @@ def make_bodies_workspace(
         Force fields of the scene, which add fields to the record of a body.
     polyhedra : sequence
         The bodies as `make_hulls` takes them; empty if the world has no hulls.
+    fixed : array (bodies,) int64, optional
+        1 for each fixed body, 0 for others; copied. None: no body is fixed.
     wall_materials : WallMaterials, optional
         Layout of the coefficients at walls; None: those of a body act at all of them.
     pair_materials : PairMaterials, optional
         Rules and exceptions for two bodies; None: the default rules.
-    meet : bool
-        True if bodies touch each other, False if they touch walls only.
+    meet : int
+        The setting of this name.
     is_sequential : bool
         True if colliding contacts are resolved one after the other.
     is_error_controlled : bool
@@ -138,7 +141,7 @@ def make_bodies_workspace(
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, wall_materials, relative_slop),
+        bodies=_make_bodies(bodies, terms, wall_materials, relative_slop, fixed),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -153,7 +156,13 @@ def make_bodies_workspace(
     )
 
 
-def _make_bodies(bodies: int, terms: tuple[Term, ...], materials: WallMaterials | None, relative_slop: float) -> Bodies:
+def _make_bodies(
+    bodies: int,
+    terms: tuple[Term, ...],
+    materials: WallMaterials | None,
+    relative_slop: float,
+    fixed: np.ndarray | None,
+) -> Bodies:
     records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
     if materials is not None:
@@ -172,6 +181,7 @@ def _make_bodies(bodies: int, terms: tuple[Term, ...], materials: WallMaterials 
         touched=np.zeros(bodies, np.int64),
         spin_bound=np.zeros(bodies),
         lift_work=np.zeros(bodies),
+        fixed=None if fixed is None else fixed.copy(),
     )
 
 

@@ -17,7 +17,7 @@ slots     a power of two, at least twice the contacts
 ========  ==============================================================
 
 Arrays are of float64; `int` in a shape means int64. Contacts and bodies are referred to by their indices. Where a body
-is expected, -1 - k stands for wall k.
+is expected, -1 - k stands for wall k, and -1 - walls - b for the fixed body b (`fixed_bodies`).
 """
 
 from __future__ import annotations
@@ -102,6 +102,7 @@ class Bodies(NamedTuple):
     touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
     spin_bound: np.ndarray  # (bodies,) bound of |ω| if the body may turn far in this stage, else 0 [rad/s]
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
+    fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
 
 
 class BroadPhase(NamedTuple):
@@ -129,7 +130,7 @@ class NarrowPhase(NamedTuple):
 class ContactSet(NamedTuple):
     """Contact set of a stage, a row for each contact."""
 
-    bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k
+    bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k; below: `fixed_bodies`
     id: np.ndarray  # (contacts,) int, contact name: the same while the same features touch
     owner: np.ndarray  # (contacts,) int, body that the normal turns with; -1: none; -2: `contact_set.PARTED`
     normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the owner's frame (no owner: world)

@@ -10,6 +10,7 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
+from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
@@ -120,6 +121,7 @@ def contact_velocity(k, many):
 @inlined
 def pair_slop(a, b, many):
     """Largest gap at which bodies a and b count as touching, or body a and a wall if b < 0 [m]."""
+    b = body_at(b, many)
     if b < 0:
         return many.bodies.body[a].slop
     return min(many.bodies.body[a].slop, many.bodies.body[b].slop)
@@ -137,12 +139,18 @@ def parted_slack(k, many):
 
 
 @inlined
-def arrival_gap(a, b, many):
-    """Gap at which bodies a and b (b < 0: a wall) count as touching if one of them turns far in the stage [m]."""
-    radius = many.bodies.body[a].radius
+def smaller_radius(a, b, many):
+    """Bounding radius of the smaller one of bodies a and b, or of body a if b is a wall [m]."""
+    radius, b = many.bodies.body[a].radius, body_at(b, many)
     if b >= 0:
         radius = min(radius, many.bodies.body[b].radius)
-    return max(pair_slop(a, b, many), ARRIVAL_SHARE * radius)
+    return radius
+
+
+@inlined
+def arrival_gap(a, b, many):
+    """Gap at which bodies a and b (b < 0: a wall) count as touching if one of them turns far in the stage [m]."""
+    return max(pair_slop(a, b, many), ARRIVAL_SHARE * smaller_radius(a, b, many))
 
 
 @inlined
@@ -238,7 +246,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     Parameters
     ----------
     a, b : int
-        Bodies; b = -1 - k is wall k.
+        Bodies, of which one may be fixed; b = -1 - k is wall k. A fixed body becomes the second one.
     feature : int
         Number of the touching features of this pair: below `FEATURES_PER_PAIR` unless one of the two is a hull.
     owner : int
@@ -259,7 +267,9 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     if k == many.contacts.gap.shape[0]:
         many.counts[NUM_DROPPED] += 1
         return False
-    many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, b
+    a, b, normal, points = moving_first(a, b, normal, points, many)
+    end = end_of(b, many)
+    many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, end
     _write_anchor(k, a, 0, points[0], many)
     acceleration = many.bodies.body[a].acceleration
     partner = count - 1 - b
@@ -287,10 +297,10 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     many.contacts.id[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
     _combine_materials(k, a, b, many)
     many.bodies.touched[a] = 1
-    if b >= 0:
+    if end >= 0:
         many.bodies.touched[b] = 1
-        if is_stopping(gap, speed, slop, h):
-            many.counts[NUM_STOPPING] += 1
+    if b >= 0 and is_stopping(gap, speed, slop, h):
+        many.counts[NUM_STOPPING] += 1
     many.counts[NUM_CONTACTS] = k + 1
     return True
 
@@ -353,13 +363,13 @@ def update_contacts(many):
     body's point.
     """
     for k in range(many.counts[NUM_CONTACTS]):
-        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        a, b = many.contacts.bodies[k, 0], body_at(many.contacts.bodies[k, 1], many)
         n = _turn_frame(k, a, b, many)
         arm = _carried_point(a, k, 0, -1.0, n, many)
         put_vector(many.contacts.arm, k, 0, arm)
         point = add_scaled(arm, 1.0, row_vector(many.bodies.state, a, 0))
         if b < 0:
-            many.contacts.gap[k] = qt.dot(n, point) - many.walls[-1 - b, 9]
+            many.contacts.gap[k] = qt.dot(n, point) - many.walls[-1 - many.contacts.bodies[k, 1], 9]
             continue
         arm = _carried_point(b, k, 3, 1.0, n, many)
         put_vector(many.contacts.arm, k, 3, arm)

@@ -14,6 +14,7 @@ from physics.kernels.forces.two_body_spring import unite_linked_bodies
 from physics.kernels.math.union_find import find_root, unite_sets
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.kernels.state.body import read_state, write_state
+from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.sleeping import (
     EARLIER_DISPLACEMENT,
     LAST_DISPLACEMENT,
@@ -50,27 +51,38 @@ def wake_world(world, count, sleep):
 
 
 @inlined
-def is_world_asleep(world, count, sleep):
-    """True if every body of a world of `count` bodies sleeps."""
-    for i in range(world * count, (world + 1) * count):
-        if not is_asleep(i, sleep):
+def is_world_asleep(world, sleep, many):
+    """True if every body of a world that is not fixed sleeps."""
+    first = world * many.bodies.state.shape[0]
+    for b in range(many.bodies.state.shape[0]):
+        if not (is_fixed(b, many.bodies) or is_asleep(first + b, sleep)):
             return False
     return True
 
 
 @inlined
-def is_staying_asleep(world, count, wrench, sleep):
-    """True if every body of a world sleeps and none has a new wrench.
+def is_staying_asleep(world, wrench, sleep, many):
+    """True if every body of a world sleeps and none has a new wrench; fixed bodies do not count.
 
     `wrench` (rows, 6) holds the wrenches on the bodies of all worlds. A body whose wrench has changed wakes with its
     group.
     """
-    for i in range(world * count, (world + 1) * count):
+    count = many.bodies.state.shape[0]
+    for b in range(count):
+        i = world * count + b
+        if is_fixed(b, many.bodies):
+            continue
         if has_new_wrench(i, wrench, sleep):
             if is_asleep(i, sleep):
                 wake_group(world, count, sleep.rows[i, SLEEP_GROUP], sleep)
             wake_body(i, sleep)
-    return is_world_asleep(world, count, sleep)
+    return is_world_asleep(world, sleep, many)
+
+
+@inlined
+def _has_fixed_body(k, many):
+    """True if a body of near pair k is fixed: it belongs to no group, and wakes nothing."""
+    return is_fixed(many.broadphase.pairs[k, 0], many.bodies) or is_fixed(many.broadphase.pairs[k, 1], many.bodies)
 
 
 @kernel
@@ -83,6 +95,8 @@ def wake_touched_groups(world, sleep, many):
     while is_waking:
         is_waking = False
         for k in range(many.counts[NUM_PAIRS]):
+            if _has_fixed_body(k, many):
+                continue
             a, b = first + many.broadphase.pairs[k, 0], first + many.broadphase.pairs[k, 1]
             if is_asleep(a, sleep) != is_asleep(b, sleep):
                 group = max(sleep.rows[a, SLEEP_GROUP], sleep.rows[b, SLEEP_GROUP])
@@ -96,7 +110,8 @@ def _union_near_pairs(many):
     for b in range(many.islands.parent.shape[0]):
         many.islands.parent[b] = b
     for k in range(many.counts[NUM_PAIRS]):
-        unite_sets(many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1], many.islands.parent)
+        if not _has_fixed_body(k, many):
+            unite_sets(many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1], many.islands.parent)
     unite_linked_bodies(many.islands.parent, many.bodies)
 
 
@@ -114,6 +129,8 @@ def put_quiet_groups_to_sleep(world, sleep, many):
     for b in range(count):
         found[b, 0] = found[b, 1] = found[b, 2] = 0.0
     for b in range(count):
+        if is_fixed(b, many.bodies):
+            continue
         root, i = find_root(b, many.islands.parent), first + b
         found[root, 0] = max(found[root, 0], sleep.rows[i, LAST_DISPLACEMENT])
         found[root, 1] = max(found[root, 1], sleep.rows[i, EARLIER_DISPLACEMENT])
@@ -121,7 +138,9 @@ def put_quiet_groups_to_sleep(world, sleep, many):
             found[root, 2] = 1.0
     for b in range(count):
         root = find_root(b, many.islands.parent)
-        if is_asleep(first + b, sleep) or found[root, 2] == 1.0 or is_motion_growing(found[root, 0], found[root, 1]):
+        if is_asleep(first + b, sleep) or is_fixed(b, many.bodies):
+            continue
+        if found[root, 2] == 1.0 or is_motion_growing(found[root, 0], found[root, 1]):
             continue
         sleep.rows[first + b, SLEEP_GROUP] = root + 1.0
         write_state(many.bodies.state, b, without_velocities(read_state(many.bodies.state, b)))
@@ -132,6 +151,8 @@ def update_sleep(world, h, sleep, many):
     """Update the sleep windows of all awake bodies of a world after a substep of h [s]; put quiet groups to sleep."""
     first, is_time = world * many.bodies.state.shape[0], False
     for b in range(many.bodies.state.shape[0]):
+        if is_fixed(b, many.bodies):
+            continue
         if not is_asleep(first + b, sleep) and update_sleep_window(
             first + b, read_state(many.bodies.state, b), h, many.bodies.body[b], sleep
         ):

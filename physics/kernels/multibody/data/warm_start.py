@@ -22,6 +22,7 @@ from physics.kernels.multibody.data.arrays import (
     WARM_STAGE_LENGTH,
 )
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
+from physics.kernels.multibody.data.fixed_bodies import shown_end
 from physics.kernels.state.sleeping import is_asleep
 
 
@@ -133,7 +134,7 @@ def store_warm_impulses(n, world, h, sleep, memory, many):
         memory[world, row + WARM_CONTACT_ID] = many.contacts.id[k]
         memory[world, row + WARM_BODY_A], memory[world, row + WARM_BODY_B] = (
             many.contacts.bodies[k, 0],
-            many.contacts.bodies[k, 1],
+            shown_end(many.contacts.bodies[k, 1], many),
         )
         p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         put_vector(memory, world, row + WARM_IMPULSE, p)

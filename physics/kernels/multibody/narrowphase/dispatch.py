@@ -18,6 +18,7 @@ from physics.kernels.multibody.narrowphase.ellipsoid_distance import collide_ell
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import collide_ellipsoid_hull, collide_sphere_hull
 from physics.kernels.multibody.narrowphase.hull_hull import collide_hulls
 from physics.kernels.multibody.narrowphase.sphere_contacts import collide_sphere_block, collide_spheres
+from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, SPHERE
 from physics.kernels.state.sleeping import is_asleep
 
@@ -33,13 +34,13 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
     many.counts[NUM_CONTACTS] = many.counts[NUM_PAIRS] = many.counts[NUM_STOPPING] = 0
     bodies = many.bodies.body
     first_row = world * bodies.shape[0]
-    if many.settings[0].meet == 1:
+    if many.settings[0].meet > 0:
         find_pairs(h, many)
     if sleep is not None:
         wake_touched_groups(world, sleep, many)
     for b in range(bodies.shape[0]):
         many.bodies.touched[b] = 0
-        if is_asleep(first_row + b, sleep):
+        if is_asleep(first_row + b, sleep) or is_fixed(b, many.bodies):
             continue
         margin = surface_motion_bound(b, h, many) + bodies[b].slop
         for wall in range(many.walls.shape[0]):
@@ -52,8 +53,8 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
             collide_body_wall(b, wall, margin, h, many)
     for k in range(many.counts[NUM_PAIRS]):
         a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
-        if is_asleep(first_row + a, sleep):
-            continue  # b sleeps, too: `wake_touched_groups` has woken all that a waking body may touch
+        if is_asleep(first_row + a, sleep) or (is_fixed(a, many.bodies) and is_asleep(first_row + b, sleep)):
+            continue  # b sleeps, too, or is fixed: `wake_touched_groups` has woken all that a waking body may touch
         if not may_meet(a, b, h, many):
             continue
         margin = surface_motion_bound(a, h, many) + surface_motion_bound(b, h, many) + pair_slop(a, b, many)

@@ -21,6 +21,7 @@ from physics.kernels.multibody.data.contact_set import subtract
 from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, are_all_finite, read_state
+from physics.kernels.state.fixed_body import is_fixed
 
 # Units in a substep. The shortest part is one unit long at first.
 _UNITS_PER_SUBSTEP = 2**24
@@ -161,14 +162,15 @@ def _step_with_halving(world, start, unit, part, shortest, switches, kept, recor
 
 @inlined
 def _min_load_speed(h, many):
-    """Least speed that loads give to a body in a time h [s], over all bodies [m/s].
+    """Least speed that loads give to a body in a time h [s], over all bodies that are not fixed [m/s].
 
     It is the smallest scale of contact problems under error control. Solves in short parts are then as coarse as in
     half a substep. A finer goal would be below the rounding of bodies that turn on edges.
     """
     least = math.inf
     for b in range(many.bodies.state.shape[0]):
-        least = min(least, many.bodies.body[b].acceleration * h)
+        if not is_fixed(b, many.bodies):
+            least = min(least, many.bodies.body[b].acceleration * h)
     return least
 
 

@@ -41,6 +41,7 @@ from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
 from physics.kernels.state.body import angular_velocity, read_state
+from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.layout import HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
 # Turn from which a body turns far under error control [rad]. A point of a body that turns by θ leaves the straight line
@@ -192,6 +193,8 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 @inlined
 def _turning_acceleration(b, h, offset_frame, many):
     """Bound of the acceleration [m/s²] that the rotation of body b gives to its points within h [s]."""
+    if is_fixed(b, many.bodies):
+        return 0.0
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:

@@ -15,6 +15,7 @@ from physics.kernels.multibody.data.contact_set import (
     parted_slack,
     put_vector,
     relative_acceleration_bound,
+    smaller_radius,
 )
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
@@ -83,10 +84,7 @@ def impact_speed_limit(k, h, many):
     (`adaptive_substep`) the result is at most `rest_speed_limit`. Otherwise a slow impact would be approached by ever
     shorter parts, down to the allowed error.
     """
-    one, other = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-    radius = many.bodies.body[one].radius
-    if other >= 0:
-        radius = min(radius, many.bodies.body[other].radius)
+    radius = smaller_radius(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
     fast = _FAST_RADIUS_SHARE * radius / h
     if many.settings[0].is_error_controlled == 1:
         fast = min(fast, rest_speed_limit(k, h, many))
@@ -168,9 +166,7 @@ def _is_in_same_moment(k, many):
     a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
     if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):
         return True
-    radius = many.bodies.body[a].radius
-    if b >= 0:
-        radius = min(radius, many.bodies.body[b].radius)
+    radius = smaller_radius(a, b, many)
     way = max(-many.contacts.speed[k] * many.settings[0].substep, _SAME_MOMENT_RADII * radius)
     return gap <= many.settings[0].tolerance * way and (_pair_touches(k, 1, many) or _pair_touches(k, -1, many))
 

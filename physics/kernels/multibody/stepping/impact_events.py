@@ -6,6 +6,7 @@ from physics.compiler.decorators import kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix
+from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.state.layout import POS
 from physics.kernels.time_stepping import event_log as ev
 
@@ -31,6 +32,7 @@ def log_impacts(n, world, t, many, log, counts):
         if k + 1 < n and many.contacts.bodies[k + 1, 0] == a and many.contacts.bodies[k + 1, 1] == b:
             continue
         if sums[2] > ev.EVENT_IMPULSE_ROUNDING * largest:
-            wall, other = (-1 - b, ev.NOBODY) if b < 0 else (-1, b)
+            other = body_at(b, many)
+            wall, other = (-1 - b, ev.NOBODY) if other < 0 else (-1, other)
             ev.note_impact(log, counts, first_row + a, t, wall, other, impulse, sums)
         impulse, sums = (0.0, 0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.target_velocity import (
     GAP_CLOSING_SHARE,
     MAX_TARGET_TURN,
@@ -31,6 +31,7 @@ from physics.kernels.multibody.data.contact_set import (
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
 from physics.kernels.multibody.data.kinematics import update_body_pose
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
@@ -43,6 +44,7 @@ from physics.kernels.multibody.stepping.impact import FORETOLD
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
+from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.groups import FlightSwitches, has_friction
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 from physics.kernels.state.sleeping import is_asleep
@@ -96,6 +98,21 @@ def _coriolis(k, many):
     return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), relative_velocity(k, many.bodies.twist, many)))
 
 
+@if_given("many.bodies.fixed", 0.0)
+def _turn_of_line(a, b, many):
+    """Acceleration |u|²/d of the gap of two spheres because the line of their centres turns [m/s²]; else 0.
+
+    u is the relative velocity of the centres across that line, d their distance. `b` is an end of a contact.
+    """
+    b = body_at(b, many)
+    if b < 0 or not many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
+        return 0.0
+    d = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
+    u = subtract(row_vector(many.bodies.twist, a, 0), row_vector(many.bodies.twist, b, 0))
+    square, along = qt.dot(d, d), qt.dot(u, d)
+    return (qt.dot(u, u) - along * along / square) / math.sqrt(square) if square > 0.0 else 0.0
+
+
 @inlined
 def set_resting_targets(n, h, many):
     """Set the target velocities of the n contacts in a resting stage of length h [s], with gaps at its middle.
@@ -112,8 +129,9 @@ def set_resting_targets(n, h, many):
         if b >= 0:
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+        t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
         gap = many.contacts.gap[k]
-        if many.settings[0].is_error_controlled == 1:
+        if many.settings[0].is_error_controlled == 1 or has_fixed(many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
         t = clamp_target_to_energy(t, contact_velocity(k, many))
@@ -140,6 +158,8 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
     if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
         return
     for b in range(many.bodies.state.shape[0]):
+        if is_fixed(b, many.bodies):
+            continue
         if many.bodies.touched[b] == 1:
             hold_contact_loads(read_state(many.bodies.state, b), h, gyroscopic, offset_frame, many.bodies.body[b])
         else:
@@ -183,7 +203,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     """
     half, first = 0.5 * h, world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
-        if is_asleep(first + b, sleep):
+        if is_asleep(first + b, sleep) or is_fixed(b, many.bodies):
             continue
         if many.bodies.touched[b] == 0:
             flight = FlightSwitches(switches.flight.gyroscopic, switches.flight.offset_frame, switches.flight.scheme)

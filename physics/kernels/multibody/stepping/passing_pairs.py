@@ -33,6 +33,7 @@ from physics.kernels.multibody.data.contact_set import (
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
 from physics.kernels.state.body import read_state
@@ -58,6 +59,12 @@ _MAX_THINNING_SHARE = 0.5
 
 
 @inlined
+def _bodies_of(k, many):
+    """Bodies of contact k; the second may be fixed, and is below 0 for a wall."""
+    return many.contacts.bodies[k, 0], body_at(many.contacts.bodies[k, 1], many)
+
+
+@inlined
 def _depth_after(k, h, many):
     """Depth of contact k after h [s] at its present speed [m]; negative if the contact is still open."""
     return -many.contacts.gap[k] - h * many.contacts.speed[k]
@@ -72,6 +79,16 @@ def _smallest_half_width(b, many):
     return min(d[0], min(d[1], d[2]))
 
 
+@inlined
+def _is_beside_pair(k, a, b, many):
+    """True if contact k belongs to another pair than bodies a and b, and one of its bodies is a or b.
+
+    If b is fixed, bodies that touch b do not count: they do not move it.
+    """
+    c, d, end = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], end_of(b, many)
+    return (c != a or d != end) and (c == a or c == b or d == a or (d == end and end >= 0))
+
+
 @kernel
 def _thinning(a, b, n, h, many):
     """Depth by which bodies a and b are taken thinner [m]: the slop, plus their landing depth within h [s].
@@ -81,8 +98,7 @@ def _thinning(a, b, n, h, many):
     """
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
-        c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-        if (c == a and d == b) or (c not in (a, b) and d not in (a, b)) or many.contacts.target[k, 0] == _PASSING:
+        if not _is_beside_pair(k, a, b, many) or many.contacts.target[k, 0] == _PASSING:
             continue
         depth = max(_depth_after(k, h, many), -many.contacts.gap[k])
         if depth <= _MAX_DEPTH_SLOPS * slop:
@@ -98,8 +114,7 @@ def _moves_as_foreseen(a, b, gap, n, h, many):
     "Near" means a contact with another body or a wall, among the n of the set.
     """
     for k in range(n):
-        c, d = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-        if (c != a or d != b) and (c in (a, b) or d in (a, b)):
+        if _is_beside_pair(k, a, b, many):
             return False
     one, other = many.bodies.body[a].free_acceleration, many.bodies.body[b].free_acceleration
     g = subtract(as_vector(one), as_vector(other))
@@ -163,7 +178,7 @@ def _have_point_in_common(k, now, later, thinner, hulls, many):
     points. If it fails, the bodies may still overlap. `now` and `later` are pairs of poses (geometric centre, rotation
     matrix).
     """
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    a, b = _bodies_of(k, many)
     (c, R), (d, S) = now
     (x, P), (y, Q) = later
     p = add_scaled(row_vector(many.contacts.arm, k, 0), 1.0, subtract(row_vector(many.bodies.state, a, 0), c))
@@ -181,7 +196,7 @@ def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
 
     The bodies are shrunk by `thinner` [m] on all sides.
     """
-    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
     now = (
         (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
         (row_vector(many.bodies.center, b, 0), row_matrix(many.bodies.rotation, b)),
@@ -221,7 +236,8 @@ def _fastest_stopping(first, last, h, many):
 
     A contact with a wall does not count, nor a pair that `conservative_advancement` serves since a body turns far.
     """
-    a, b, found = many.contacts.bodies[first, 0], many.contacts.bodies[first, 1], -1
+    a, b = _bodies_of(first, many)
+    found = -1
     if b < 0 or many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0:
         return found
     for k in range(first, last):
@@ -238,7 +254,7 @@ def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
     parts them when they are thinned by the slop alone, and the plane is not across the normal of contact k. n is the
     number of contacts in the set, h the length of the stage [s].
     """
-    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
     slop, thinnest = pair_slop(a, b, many), _thinning(a, b, n, h, many)
     m, is_parted = _parting_direction(k, thinnest, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted:
@@ -276,7 +292,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     bodies may be the normal of contact k already. Or the bodies touch along that direction, unless contact k is deeper
     than their thinning allows along any direction. Passing bodies that nothing else can push get no contact.
     """
-    a, b, way = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
     mark, thinner = many.contacts.target[k, 0], _thinning(a, b, n, h, many)
     if mark == _MEETING or (mark != _PASSING and not thinner > pair_slop(a, b, many)):
         return False, to

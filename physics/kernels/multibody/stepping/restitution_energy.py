@@ -10,6 +10,7 @@ from physics.kernels.multibody.data.contact_set import add_scaled, put_vector
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
+from physics.kernels.state.fixed_body import is_fixed
 
 # First columns of the momenta before an impact, and after its full rebound, in `many.bodies.momenta`.
 _PRE_IMPACT, _FULL_REBOUND = 0, 6
@@ -41,6 +42,8 @@ def world_kinetic_energy(offset_frame, many):
     _update_twists(offset_frame, many)
     total = 0.0
     for b in range(many.bodies.state.shape[0]):
+        if is_fixed(b, many.bodies):
+            continue
         v, L = row_vector(many.bodies.state, b, at.LINVEL), row_vector(many.bodies.state, b, at.ANGMOM)
         total += 0.5 * (qt.dot(v, v) / many.bodies.inv_mass[b] + qt.dot(L, row_vector(many.bodies.twist, b, 3)))
     return total

@@ -28,6 +28,7 @@ from physics.kernels.state.body import (
     report_fault,
     write_state,
 )
+from physics.kernels.state.fixed_body import clear_loads, is_fixed
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
 
@@ -64,11 +65,13 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
     bodies = shapes.shape[0]
     clear_report(world, report)
     clear_events(world, bodies, log, counts)
-    if sleep is not None and is_staying_asleep(world, bodies, wrench, sleep):
+    if sleep is not None and is_staying_asleep(world, wrench, sleep, many):
         return
     for b in range(bodies):
         i = world * bodies + b
         bind_body(world, i, shapes[b], arrays, switches.friction, restitution, offset_frame, many.bodies.body[b])
+        if is_fixed(b, many.bodies):
+            clear_loads(many.bodies.body[b])
         many.bodies.inv_mass[b] = params[i, at.INV_MASS]
         bind_fields(params, i, switches.flight.scheme, many.bodies.body[b])
         bind_wall_coefficients(params, i, many.bodies.body[b])
@@ -98,7 +101,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
             update_sleep(world, h, sleep, many)
         for b in range(bodies):
             write_state(state, world * bodies + b, read_state(many.bodies.state, b))
-        if sleep is not None and is_world_asleep(world, bodies, sleep):
+        if sleep is not None and is_world_asleep(world, sleep, many):
             break
     report_unresolved_bodies(report, many.bodies, many.bodies.body[0])
     for b in range(bodies):

@@ -28,6 +28,8 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
+from physics.kernels.multibody.data.contact_set import smaller_radius
+from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.stepping.conservative_advancement import (
@@ -61,13 +63,9 @@ def record_penetration(n, world, memory, report, many):
     for k in range(n):
         depth = -many.contacts.gap[k]
         report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
-        if is_start and many.contacts.bodies[k, 1] >= 0:
-            radius = min(
-                many.bodies.body[many.contacts.bodies[k, 0]].radius,
-                many.bodies.body[many.contacts.bodies[k, 1]].radius,
-            )
-            if depth > OVERLAP_SHARE * radius:
-                report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
+        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        if is_start and body_at(b, many) >= 0 and depth > OVERLAP_SHARE * smaller_radius(a, b, many):
+            report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
     report[world, at.CONTACTS_LEFT_OUT] += many.counts[NUM_DROPPED]
     many.counts[NUM_DROPPED] = 0
 

@@ -34,6 +34,8 @@ def refuse_meetings(scene: physics.Scene) -> None:
     contact = scene.effect(physics.Contact)
     if contact is not None and contact.between_bodies and len(scene.bodies) > 1:
         raise Unsupported("contact between bodies is not handed to this engine")
+    if any(body.fixed for body in scene.bodies):
+        raise Unsupported("fixed bodies are not handed to this engine")
 
 
 class Run(Protocol):

@@ -1,0 +1,19 @@
+"""Fixed bodies, which no step moves. A group of arrays `bodies` has the member `fixed`; None: its scene has none."""
+
+from __future__ import annotations
+
+from physics.compiler.decorators import if_given, inlined
+
+
+@if_given("bodies.fixed", False)
+def is_fixed(b, bodies):
+    """True if body b is fixed."""
+    return bodies.fixed[b] == 1
+
+
+@inlined
+def clear_loads(body):
+    """Clear the loads in the record of a fixed body: neither gravity nor a wrench moves it."""
+    for c in range(3):
+        body.free_acceleration[c] = body.torque[c] = 0.0
+    body.acceleration = 0.0
