@@ -55,7 +55,7 @@ class ManyBodies(Scheme):
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)
         return allocation.make_bodies_workspace(
             bodies, walls, switches.terms, polyhedra(scene.bodies), meet=switches.meeting,
-            wall_materials=wall_materials(scene, switches, True), pair_materials=pair_materials(scene, switches),
+            materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

@@ -100,12 +100,10 @@ def make_bodies_workspace(
     terms: tuple[Term, ...] = (),
     polyhedra: Sequence = (),
     *,
-    wall_materials: WallMaterials | None = None,
-    pair_materials: PairMaterials | None = None,
+    materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     meet=True,
     is_sequential=False,
     is_error_controlled=False,
-    relative_slop: float,
     **settings: float,
 ) -> BodiesWorkspace:
     """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
@@ -120,25 +118,23 @@ def make_bodies_workspace(
         Force fields of the scene, which add fields to the record of a body.
     polyhedra : sequence
         The bodies as `make_hulls` takes them; empty if the world has no hulls.
-    wall_materials : WallMaterials, optional
-        Layout of the coefficients at walls; None: those of a body act at all of them.
-    pair_materials : PairMaterials, optional
-        Rules and exceptions for two bodies; None: the default rules.
+    materials : tuple of two
+        Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
+        bodies, None: the default rules.
     meet : bool
         True if bodies touch each other, False if they touch walls only.
     is_sequential : bool
         True if colliding contacts are resolved one after the other.
     is_error_controlled : bool
         True if steps have an error tolerance.
-    relative_slop : float
-        Gap within which features touch, in bounding radii.
     settings : float
-        Further fields of `bodies_setting_fields`, by name.
+        Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
+        bounding radii.
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, wall_materials, relative_slop),
+        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop")),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -147,7 +143,7 @@ def make_bodies_workspace(
         system=_make_linear_system(bodies, block_capacity(bodies)),
         newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
         walls=walls.copy(),
-        materials=pair_materials,
+        materials=materials[1],
         counts=np.zeros(5, np.int64),
         settings=_make_settings({**settings, **switches}),
     )
