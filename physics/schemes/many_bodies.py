@@ -65,8 +65,8 @@ class ManyBodies(Scheme):
         fixed = np.array([body.fixed for body in scene.bodies], np.int64) if switches.fixed else None
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
+            materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             meet=_meetings(scene, switches),
-            wall_materials=wall_materials(scene, switches, True), pair_materials=pair_materials(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

@@ -25,7 +25,7 @@ from physics.kernels.half_space.contact_point import wall_of
 RULES = ("minimum", "average", "geometric_mean", "product", "maximum")
 """Names of the rules that combine the coefficients of two bodies, or of a body and a wall."""
 
-MINIMUM, AVERAGE, GEOMETRIC_MEAN, PRODUCT, MAXIMUM = range(len(RULES))
+MINIMUM, AVERAGE, GEOMETRIC_MEAN, PRODUCT = range(len(RULES) - 1)  # the last one is the maximum
 
 # Columns of `params` for each wall, from `body.material_column` on. A number that is missing is NaN.
 OF_WALL, OF_PAIR = 0, 2  # coefficients of the wall; those of an exception for this body and this wall

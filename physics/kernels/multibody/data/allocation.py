@@ -101,12 +101,7 @@ def make_bodies_workspace(
     polyhedra: Sequence = (),
     fixed: np.ndarray | None = None,
     *,
-    wall_materials: WallMaterials | None = None,
-    pair_materials: PairMaterials | None = None,
-    meet=1,
-    is_sequential=False,
-    is_error_controlled=False,
-    relative_slop: float,
+    materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     **settings: float,
 ) -> BodiesWorkspace:
     """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
@@ -123,25 +118,16 @@ def make_bodies_workspace(
         The bodies as `make_hulls` takes them; empty if the world has no hulls.
     fixed : array (bodies,) int64, optional
         1 for each fixed body, 0 for others; copied. None: no body is fixed.
-    wall_materials : WallMaterials, optional
-        Layout of the coefficients at walls; None: those of a body act at all of them.
-    pair_materials : PairMaterials, optional
-        Rules and exceptions for two bodies; None: the default rules.
-    meet : int
-        The setting of this name.
-    is_sequential : bool
-        True if colliding contacts are resolved one after the other.
-    is_error_controlled : bool
-        True if steps have an error tolerance.
-    relative_slop : float
-        Gap within which features touch, in bounding radii.
+    materials : tuple of two
+        Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
+        bodies, None: the default rules.
     settings : float
-        Further fields of `bodies_setting_fields`, by name.
+        Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
+        bounding radii. By default bodies touch each other (`meet` is 1).
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
-    switches = {"meet": meet, "is_sequential": is_sequential, "is_error_controlled": is_error_controlled}
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, wall_materials, relative_slop, fixed),
+        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -150,9 +136,9 @@ def make_bodies_workspace(
         system=_make_linear_system(bodies, block_capacity(bodies)),
         newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
         walls=walls.copy(),
-        materials=pair_materials,
+        materials=materials[1],
         counts=np.zeros(5, np.int64),
-        settings=_make_settings({**settings, **switches}),
+        settings=_make_settings({"meet": 1, **settings}),
     )
 
 
