@@ -65,7 +65,7 @@ def gap_of(a, b):
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), CUBE, 2.0, (0, 1, 0)),
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 0, 5)), physics.Ellipsoid((1, 1, 0.5), 1.0), 1.5, (0, 0, 1)),
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), physics.Sphere(1.0, 1.0), 2.0, (0, 1, 0)),
-        (physics.Ellipsoid((1, 1, 1), 1.0, pos=(3, 3, 0.2)), HULL_CUBE, math.sqrt(8) - 1, (0.5**0.5, 0.5**0.5, 0)),  # edge
+        (physics.Ellipsoid((1, 1, 1), 1.0, pos=(3, 3, 0.2)), HULL_CUBE, 8**0.5 - 1, (0.5**0.5, 0.5**0.5, 0)),  # edge
         (physics.Ellipsoid((1, 1, 1), 1.0, pos=(2, 3, 3)), HULL_CUBE, 2.0, (1 / 3, 2 / 3, 2 / 3)),  # vertex
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), HULL_CUBE, 2.0, (0, 1, 0)),  # face
         # From (1, 1, 1) to the plane x + y + z = 1.
