@@ -22,6 +22,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Scene.walls are given, but no ef
 EPS = np.finfo(float).eps
 NOTHING = -(2**31)
 CUBE = physics.Block((2, 2, 2), 1.0)
+HULL_CUBE = physics.Hull([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], 1.0)
 DIAGONAL = (math.cos(math.pi / 8), 0, 0, math.sin(math.pi / 8))  # 45 degrees about z
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 
@@ -64,6 +65,9 @@ def gap_of(a, b):
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), CUBE, 2.0, (0, 1, 0)),
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 0, 5)), physics.Ellipsoid((1, 1, 0.5), 1.0), 1.5, (0, 0, 1)),
         (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), physics.Sphere(1.0, 1.0), 2.0, (0, 1, 0)),
+        (physics.Ellipsoid((1, 1, 1), 1.0, pos=(3, 3, 0.2)), HULL_CUBE, 8**0.5 - 1, (0.5**0.5, 0.5**0.5, 0)),  # edge
+        (physics.Ellipsoid((1, 1, 1), 1.0, pos=(2, 3, 3)), HULL_CUBE, 2.0, (1 / 3, 2 / 3, 2 / 3)),  # vertex
+        (physics.Ellipsoid((1, 2, 3), 1.0, pos=(0, 5, 0)), HULL_CUBE, 2.0, (0, 1, 0)),  # face
         # From (1, 1, 1) to the plane x + y + z = 1.
         (physics.Sphere(0.1, 1.0, pos=(1, 1, 1)), physics.Hull(TETRAHEDRON, 1.0, pos=(0.25, 0.25, 0.25)),
          2 / math.sqrt(3) - 0.1, (3**-0.5,) * 3),
