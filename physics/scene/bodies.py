@@ -129,7 +129,9 @@ class Body(_Shape):
             raise ValueError(f"mass is {shown(self.mass)} of a fixed body; allowed is none: leave it out")
         for name in ("density", "inertia_body"):
             if getattr(self, name) is not None:
-                raise ValueError(f"{name} is {shown(getattr(self, name))} of a fixed body; allowed is none: leave it out")
+                raise ValueError(
+                    f"{name} is {shown(getattr(self, name))} of a fixed body; allowed is none: leave it out"
+                )
         for name in ("linvel", "angvel", "center"):
             if np.any(validation.finite(getattr(self, name), (3,), name)):
                 raise ValueError(f"{name} is {shown(getattr(self, name))} of a fixed body; allowed is (0, 0, 0)")

@@ -124,9 +124,7 @@ def ramp(angle: float = 0.4, friction: float = 0.2) -> Scene:
         return above * up[0] - along * down[0], height + above * up[1] - along * down[1], 0.0
 
     block = Block(SIZE, MASS, pos=place(way, SIZE[1] / 2), quat=turn)
-    support = Block(
-        (length, thickness, 6.0), pos=place(length / 2, -thickness / 2), quat=turn, fixed=True, name="ramp"
-    )
+    support = Block((length, thickness, 6.0), pos=place(length / 2, -thickness / 2), quat=turn, fixed=True, name="ramp")
     effects: list[Effect] = [Gravity((0, -GRAVITY, 0)), Contact(), Friction(friction)]
     return Scene([block, support], [HalfSpace((0, 1, 0))], effects)
 

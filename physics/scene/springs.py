@@ -46,6 +46,7 @@ def check_ends(effect: Any, bodies: Sequence[Any]) -> None:
             f"{name}.other is {other}, a fixed body; {none}, or an anchor in the world: anchor={tuple(anchor.tolist())}"
         )
 
+
 @known_keywords
 @dataclass(frozen=True)
 class Spring(Checked):

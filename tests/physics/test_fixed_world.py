@@ -75,7 +75,7 @@ def test_snapshots_and_pickles_go_on_with_the_same_bits():
 
 
 def test_a_snapshot_of_a_moving_body_does_not_fit():
-    """Whether a body is fixed is a setting of the scene."""
+    """Fixed bodies are a setting of the scene."""
     moving = physics.Block(TABLE.size, 1.0, pos=TABLE.pos, name="table")
     other = physics.World(physics.Scene([cube(1.0), moving], effects=LAWS), dt=0.005)
     with pytest.raises(ValueError, match="fixed block"):
@@ -124,7 +124,8 @@ def test_contacts_and_impacts_name_the_body():
     found = world.read_contacts()
     assert (found.ends[0, : int(found.count[0])] == (0, 1)).all()
     events = physics.simulate(scene(cube(0.3, linvel=(0, -2, 0))), 0.1, dt=0.005).events
-    assert [(event.body, event.other, event.wall) for event in events if event.kind == "impact"][0] == (0, 1, -1)
+    first = next(event for event in events if event.kind == "impact")
+    assert (first.body, first.other, first.wall) == (0, 1, -1)
 
 
 def test_friction_of_a_pair_is_the_geometric_mean():
