@@ -23,7 +23,7 @@ from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
 
 def _meetings(scene: Scene, switches: Switches) -> int:
-    """Which bodies may touch each other, as the setting `meet`: 0 none, 1 all, 2 only a moving and a fixed one."""
+    """Code of the setting `meet`: 0 if no bodies touch each other, 1 if all may, 2 if only a moving and a fixed one."""
     contact = scene.effect(Contact)
     if contact is None or not switches.meeting:
         return 0

@@ -58,8 +58,8 @@ def root_mean_square(difference: np.ndarray) -> float:
 def mechanical_energy(scene: Scene, pos, quat, linvel, angvel) -> np.ndarray:
     """Sum of kinetic energy and of the potential energy of gravity [J], (samples, bodies); 0 potential at the origin.
 
-    It serves samples of other engines; a `Trajectory` of this engine has its energy. A fixed body has none. The arguments are
-    (samples, bodies, 3|4|3|3), in the world frame.
+    It serves samples of other engines; a `Trajectory` of this engine has its energy. A fixed body has none. The
+    arguments are (samples, bodies, 3|4|3|3), in the world frame.
     """
     gravity = scene.effect(Gravity)
     pull = np.array(gravity.acceleration if gravity else (0.0, 0.0, 0.0))

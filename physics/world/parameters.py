@@ -182,8 +182,8 @@ def _new_masses(mass, shape, field, bodies) -> np.ndarray:
     bad = np.flatnonzero((fixed & (mass != np.inf)).any(axis=0))
     if len(bad):
         raise ValueError(
-            f"mass is {shown(mass[0, bad[0]])} for Scene.bodies[{bad[0]}], which is fixed; allowed is inf for it, in an "
-            "array with the masses of all bodies"
+            f"mass is {shown(mass[0, bad[0]])} for Scene.bodies[{bad[0]}], which is fixed; allowed is inf for it, in "
+            "an array with the masses of all bodies"
         )
     return np.where(fixed, np.inf, finite)
 

@@ -118,8 +118,8 @@ def _check_still(world: Batch, chosen, name: str, value: np.ndarray) -> None:
     if len(bad):
         k, b = bad[0].tolist()
         raise ValueError(
-            f"{name} is {value[k, b].tolist()} for body {body_label(b, world.names)} in world {int(chosen[k])}, which is "
-            "fixed; allowed is (0, 0, 0)"
+            f"{name} is {value[k, b].tolist()} for body {body_label(b, world.names)} in world {int(chosen[k])}, which "
+            "is fixed; allowed is (0, 0, 0)"
         )
 
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 SCENE_FILES = (".toml", ".xml", ".urdf")  # as of `rigid_env.tasks.scene_source`, which takes long to import
 CANONICAL = (
-    "drop", "flight", "tumble", "rest", "shove", "corner_drop", "slide", "bounce", "rolling_sphere", "vertex_drop",
-    "closed_box", "tower", "heap", "football", "incline",
+    "drop", "flight", "tumble", "rest", "shove", "corner_drop", "slide", "ramp", "bounce", "rolling_sphere",
+    "vertex_drop", "closed_box", "tower", "heap", "football", "incline",
 )  # fmt: skip
 """Names of `physics.scenes.SCENES`, listed here because that module takes long to import."""
 

@@ -156,7 +156,10 @@ READ = {
 
 HINGE = '<body><joint name="knee"/><geom size=".1" mass="1"/></body>'
 REFUSED = {
-    "fixed box": (model(box(), world='<geom name="t" type="box" size="1 1 1"/>'), "line 4: <geom 't'> is a fixed box"),
+    "fixed rod": (
+        model(box(), world='<geom name="t" type="capsule" size="1 1"/>'),
+        "line 4: <geom 't'> is a fixed capsule",
+    ),
     "two geoms": (model(box() + box()), "line 5: <body> has 2 geoms that can touch others"),
     "no geom": (of("", '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'), "<body> has 0 geoms"),
     "capsule": (model('<geom type="capsule" size=".1 .2"/>'), "<geom> of <body> is a capsule; allowed of a free body"),

@@ -81,14 +81,15 @@ def test_what_a_scene_cannot_hold_is_named_with_its_line(name):
 def test_the_rest_is_read_and_what_was_left_out_is_listed():
     text = model(
         box('name="a" friction=".5"'), box() + box(), box('name="c"'),
-        world='<geom name="t" size="1"/>' + floor('name="f" friction=".5"'), before='<option density="1.2"/>',
+        world='<geom name="t" type="capsule" size="1 1"/>' + floor('name="f" friction=".5"'),
+        before='<option density="1.2"/>',
     )  # fmt: skip
     scene, left = read_mjcf(text, "here", drop=True)
     assert [body.pos for body in scene.bodies] == [(0, 0, 2), (2, 0, 2)]
     assert scene.walls == (physics.HalfSpace((0, 0, 1), name="f", friction=0.5),)
     assert [body.friction for body in scene.bodies] == [0.5, 1.0]
     assert scene.effect(physics.Friction) == physics.Friction(1.0, rule="maximum")
-    told = ["line 2: <option> has a medium", "line 6: <body> has 2 geoms", "line 4: <geom 't'> is a fixed sphere"]
+    told = ["line 2: <option> has a medium", "line 6: <body> has 2 geoms", "line 4: <geom 't'> is a fixed capsule"]
     assert [message.startswith(start) for message, start in zip(left, told)] == [True] * 3
     assert len(left) == 3
 
@@ -127,11 +128,11 @@ def test_included_files_and_meshes_stand_beside_the_model(tmp_path):
 
 def test_an_element_of_an_included_file_is_named_without_a_line(tmp_path):
     (tmp_path / "table.xml").write_text(
-        '<mujoco><worldbody><geom name="t" type="box" size="1 1 1"/></worldbody></mujoco>', encoding="utf-8"
+        '<mujoco><worldbody><geom name="t" type="cylinder" size="1 1"/></worldbody></mujoco>', encoding="utf-8"
     )
     path = tmp_path / "model.xml"
     path.write_text(model(box(), before='<include file="table.xml"/>'), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"model\.xml: <geom 't'> is a fixed box"):
+    with pytest.raises(ValueError, match=r"model\.xml: <geom 't'> is a fixed cylinder"):
         physics.load_mjcf(path)
 
 

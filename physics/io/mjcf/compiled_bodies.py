@@ -132,7 +132,7 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Body
             placed,
             np.concatenate((pose[:3], product(pose[3:], axes))),
             np.concatenate((velocity[:3], T @ velocity[3:])),
-            None if name in ("", unnamed(number)) else name,
+            None if name in ("", unnamed(number), unnamed(root - 1)) else name,
         )
     except ValueError as error:
         raise model.error("body", root, f"in a scene: {error}") from None

@@ -86,7 +86,7 @@ def _is_beside_pair(k, a, b, many):
     If b is fixed, bodies that touch b do not count: they do not move it.
     """
     c, d, end = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], end_of(b, many)
-    return (c != a or d != end) and (c == a or c == b or d == a or (d == end and end >= 0))
+    return (c != a or d != end) and (c in (a, b) or d == a or (d == end and end >= 0))
 
 
 @kernel
