@@ -93,7 +93,7 @@ class BlockPush(Task):
     ## Starting State
 
     Both are at rest on the floor. The crate is at a drawn distance and bearing from its place, with a drawn heading of
-    up to 1 rad. The pusher stands behind it, as seen from the goal, up to 0.8 rad astray, and faces it up to 0.8 rad
+    up to 0.8 rad. The pusher stands behind it, as seen from the goal, up to 0.5 rad astray, and faces it up to 0.5 rad
     askew. Mass of the crate and friction are drawn, too, and the agent is told both. `draws` widens the starts:
     `draws={"astray": (-3.1, 3.1), "heading": (-3.1, 3.1)}` puts the pusher anywhere and turns the crate at will.
 
@@ -142,10 +142,10 @@ class BlockPush(Task):
         "friction": (0.3, 0.5),
         "away": (0.5, 2.5),  # crate from goal [m]
         "bearing": (-np.pi, np.pi),  # of the way from the crate to the goal [rad]
-        "heading": (-1.0, 1.0),  # of the crate at the start [rad]
+        "heading": (-0.8, 0.8),  # of the crate at the start [rad]
         "apart": (1.3, 2.0),  # pusher from crate [m]
-        "astray": (-0.8, 0.8),  # pusher's bearing from the place behind the crate, seen from the crate [rad]
-        "yaw": (-0.8, 0.8),  # of the pusher, from facing the crate [rad]
+        "astray": (-0.5, 0.5),  # pusher's bearing from the place behind the crate, seen from the crate [rad]
+        "yaw": (-0.5, 0.5),  # of the pusher, from facing the crate [rad]
     }
     memory = {"held": 1, "potential": 1}
     max_episode_steps = 300
