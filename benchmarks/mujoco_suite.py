@@ -125,7 +125,7 @@ class MujocoBlockStack(_TaskEnv):
         draw = self.np_random.uniform
         apart, bearing, yaw = draw(1.8, 3.0), draw(-math.pi, math.pi), draw(-math.pi / 4, math.pi / 4)
         self.logarithm = draw(0.0, 1.0)
-        ratio = stack.LARGEST_RATIO ** -self.logarithm
+        ratio = stack.LARGEST_RATIO**-self.logarithm
         self.model.body_mass[2], self.model.body_inertia[2] = stack.MASS * ratio, self.inertia * ratio
         mujoco.mj_setConst(self.model, self.data)
         qpos = self.init_qpos.copy()

@@ -134,14 +134,14 @@ def test_drawn_masses_are_mujocos_and_the_next_episode_has_its_own():
 
 @pytest.mark.parametrize("setting", twins.SETTINGS)
 def test_a_pile_carries_its_weights(setting):
-    """At rest the contacts of A carry m g upwards. Those of B carry its own weight, M g: up from the floor, down from A.
+    """At rest the contacts of A carry m g upwards. Those of B carry M g: up from the floor, down from A.
 
     After 2 s the rest of the motion is below 1e-3 of g.
     """
     ratios = np.array([1.0, 10.0])
     envs = stack_of(*ratios, setting=setting)
     for _ in range(39):
-        *_, terminated, _, infos = envs.step(np.zeros((2, 6)))
+        terminated = envs.step(np.zeros((2, 6)))[2]
         assert not terminated.any()
     force, impulse = envs.unwrapped.task.world.read_contact_sums()
     weights = GRAVITY * np.stack([[MASS, MASS], MASS / ratios])  # by body and world
