@@ -7,6 +7,7 @@ moves, and the learning curves are drawn.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,6 +27,7 @@ from rigid_env.terminal import make_console
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = DOCS / "environments"
 PICTURES = PAGES / "images"
+TWINS = machine.RESULTS / "twins.json"
 PICTURE_SEEDS = (0, 1)
 SIZE = (280, 175)  # of a moving picture [px]
 
@@ -51,6 +53,7 @@ def page(env_id: str, results: Path = RESULTS) -> str:
     parts = [HEAD, f"# {short_name(env_id)}", _picture(env_id), described.strip()]
     if found or floors:
         parts.append("\n\n".join(["## Results", *_results(env_id, found, floors)]))
+    parts.append(_elsewhere(env_id))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -86,6 +89,20 @@ def _results(env_id: str, found: Sequence[dict[str, Any]], floors: dict[str, Any
     if env_id in pretrained_ids():
         parts.append(f"A trained policy comes with the package: `rigid-env play {env_id}`.")
     return parts
+
+
+def _elsewhere(env_id: str, file: Path = TWINS) -> str:
+    """Return the success of policies in MuJoCo, of an environment with a twin that `judge_elsewhere` has judged."""
+    kept = json.loads(file.read_text(encoding="utf-8"))
+    rows = [
+        (each["policy"], *(_rate(each["judged"][engine]) for engine in ("ours", *kept["settings"])))
+        for each in kept["rows"] if each["env"] == env_id
+    ]  # fmt: skip
+    if not rows:
+        return ""
+    heads = ["policy", "ours", *(f"MuJoCo, {setting}" for setting in kept["settings"])]
+    told = f"Success of {kept['episodes']} episodes here and in MuJoCo: `python -m benchmarks.judge_elsewhere`."
+    return "\n\n".join(["## Judged in another engine", told, machine.markdown_table(heads, rows)])
 
 
 def _rate(evaluation: dict[str, Any]) -> str:

@@ -2,11 +2,12 @@
 
 A twin is an environment of `rigid_env` whose task has `MuJoCoSteps` in place of `rigid_env.tasks.steps.Steps`. This
 module registers twins with Gymnasium: `twins/BlockReach-v0` is that of `rigid_env/BlockReach-v0`. Arguments are those
-of the original, and ``setting``, a key of `SETTINGS`.
+of the original, and ``setting``, a key of `SETTINGS`. Masses may be drawn; the other parameters are the scene's.
 """
 
 from __future__ import annotations
 
+import copy
 from typing import Any
 
 import gymnasium as gym
@@ -21,10 +22,14 @@ from physics.parallel.team import listed
 from rigid_env.lab.measure.peers.mujoco import BOUNCING, model_xml
 from rigid_env.tasks import Task
 
-ORIGINALS = ("rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0")
+ORIGINALS = ("rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0", "rigid_env/BlockStack-v0")
 
 EFFECTS = (physics.Gravity, physics.Contact, physics.Friction)
 """Effects of scenes that `model_xml` gives to MuJoCo."""
+
+_OF_MASS = {at.INV_MASS, *range(at.INV_INERTIA, at.INV_INERTIA + 3), *range(at.SERIES, at.SERIES + at.SERIES_SIZE)}
+OF_MASS = np.isin(np.arange(at.PARAM_SIZE), list(_OF_MASS))
+"""(columns,) bool: parameters of a body that change with its mass. Those of its size do not."""
 
 SETTINGS: dict[str, dict[str, Any]] = {"default": {}, "best": BOUNCING["one-step, k 0.03/h²"]}
 """Options of `model_xml` by the name of a setting; `best` is the setting that rebounds and sinks in least."""
@@ -74,7 +79,8 @@ def hand_motion(task: Task, setting: str = "default") -> None:
     if setting not in SETTINGS:
         raise ValueError(f"setting is {setting!r}; allowed are {', '.join(SETTINGS)}")
     _check(task)
-    task._advance = MuJoCoSteps(task, SETTINGS[setting])
+    task._advance = steps = MuJoCoSteps(task, SETTINGS[setting])
+    task.world.read_contact_sums = steps.read_contact_sums  # type: ignore[method-assign]
 
 
 def _check(task: Task) -> None:
@@ -105,7 +111,7 @@ class MuJoCoSteps:
     Parameters
     ----------
     task : Task
-        Task with forces and torques as actions; its mass, sizes, friction, restitution and gravity stay the scene's.
+        Task with forces and torques as actions; its sizes, friction, restitution and gravity stay the scene's.
     options : dict
         Options of `rigid_env.lab.measure.peers.mujoco.model_xml`.
 
@@ -116,7 +122,7 @@ class MuJoCoSteps:
     has_first : bool
         False, as of a control step without impulses.
     model : mujoco.MjModel
-        Model of one world.
+        Model of the scene. A world with drawn masses has its own copy.
     """
 
     has_first = False
@@ -130,7 +136,7 @@ class MuJoCoSteps:
         self._given = world.params.copy(), world.gravity.copy()
         self._state = world.state.reshape(task.worlds, world.body_count, -1)
         self._written = np.full_like(self._state, np.nan)
-        self._places = [_Place(mujoco.MjData(self.model), bodies) for bodies in self._state]
+        self._places = [_Place(self.model, bodies) for bodies in self._state]
         self._write_momenta = bound(write_angular_momenta, np.arange(len(world.state)), world.state, world.params)
         self._observe = task.observer(listed(np.arange(task.worlds))) if task.compiled else None
 
@@ -147,7 +153,7 @@ class MuJoCoSteps:
         self._take_starts()
         for place, wrench in zip(self._places, self.wrench):
             place.wrench[...] = wrench
-            mujoco.mj_step(self.model, place.data, nstep=self._frame_skip)
+            mujoco.mj_step(place.model, place.data, nstep=self._frame_skip)
             place.read()
         if not np.isfinite(self._state).all():
             raise FloatingPointError("the state of a world is not finite in MuJoCo; take another setting or step")
@@ -158,14 +164,30 @@ class MuJoCoSteps:
 
     def _take_starts(self) -> None:
         """Give MuJoCo the worlds that were changed from outside."""
-        changed = (self._state != self._written).any(axis=(1, 2))
+        changed = self._changed()
         if not changed.any():
             return
-        if not all(map(np.array_equal, self._given, (self._world.params, self._world.gravity))):
-            told = "mass, size, friction, restitution or gravity of an episode differs from the scene's"
+        params, gravity = self._given
+        if not np.array_equal(self._world.gravity, gravity) or (self._world.params != params)[:, ~OF_MASS].any():
+            told = "size, friction, restitution or gravity of an episode differs from the scene's"
             raise ValueError(f"{told}; allowed in a twin are the scene's")
+        ratios = (params[:, at.INV_MASS] / self._world.params[:, at.INV_MASS]).reshape(self._state.shape[:2])
         for world in np.flatnonzero(changed).tolist():
-            self._places[world].write(self.model)
+            self._places[world].write(ratios[world])
+
+    def _changed(self) -> np.ndarray:
+        """(worlds,) bool: worlds whose state was written from outside since the last step."""
+        return (self._state != self._written).any(axis=(1, 2))
+
+    def read_contact_sums(self, worlds: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Read the sums of MuJoCo's contact forces on each body; as `physics.World.read_contact_sums`.
+
+        The constraints of a free joint are contacts, so that its generalised constraint force is their sum.
+        """
+        indices = np.arange(len(self._places)) if worlds is None else np.asarray(worlds)
+        force = np.array([self._places[world].contact_force for world in indices.tolist()])
+        force[self._changed()[indices]] = 0.0
+        return force, force * self._world.dt
 
 
 class _Place:
@@ -174,8 +196,10 @@ class _Place:
     A free joint has its angular velocity in the body's frame, and an unnormalised quaternion.
     """
 
-    def __init__(self, data, bodies: np.ndarray):
-        self.data, self.wrench = data, data.xfrc_applied[1:]
+    def __init__(self, scene_model, bodies: np.ndarray):
+        self.model, self._scene_model = scene_model, scene_model
+        self.data = data = mujoco.MjData(scene_model)
+        self.wrench, self.contact_force = data.xfrc_applied[1:], data.qfrc_constraint.reshape(len(bodies), 6)[:, :3]
         columns = (at.POS, 3), (at.QUAT, 4), (at.LINVEL, 3), (at.ANGVEL, 3)
         ours = [tuple(row[first : first + size] for first, size in columns) for row in bodies]
         theirs = [
@@ -184,14 +208,27 @@ class _Place:
         ]
         self._pairs = list(zip(ours, theirs))
 
-    def write(self, model) -> None:
-        """Write our state into MuJoCo's, which forgets its warm start."""
-        mujoco.mj_resetData(model, self.data)
+    def write(self, mass_ratios: np.ndarray) -> None:
+        """Write our state into MuJoCo's, which forgets its warm start.
+
+        `mass_ratios` (bodies,) are the masses over those of the scene's model.
+        """
+        if self.model is not self._scene_model or (mass_ratios != 1.0).any():
+            self._set_masses(mass_ratios)
+        mujoco.mj_resetData(self.model, self.data)
         inverse = np.empty(4)
         for (pos, quat, linvel, angvel), theirs in self._pairs:
             theirs[0][...], theirs[1][...], theirs[2][...] = pos, quat, linvel
             mujoco.mju_negQuat(inverse, quat)
             mujoco.mju_rotVecQuat(theirs[3], angvel, inverse)
+
+    def _set_masses(self, ratios: np.ndarray) -> None:
+        """Scale masses and inertias in a model of this world alone, and renew the constants that follow from them."""
+        if self.model is self._scene_model:
+            self.model = copy.copy(self._scene_model)
+        self.model.body_mass[1:] = ratios * self._scene_model.body_mass[1:]
+        self.model.body_inertia[1:] = ratios[:, None] * self._scene_model.body_inertia[1:]
+        mujoco.mj_setConst(self.model, self.data)
 
     def read(self) -> None:
         """Read MuJoCo's state into ours, without angular momenta."""

@@ -52,3 +52,14 @@ def test_a_page_tells_each_seed_the_floors_and_the_matrix(tmp_path):
     assert "| fast | 2 | 90.0% | 90.0% | 90.0% | 90.0% |" in text
     assert "| tolerance 0.001 | 0 |" in text
     assert "## Observation Space" in text
+
+
+def test_a_page_tells_the_success_in_mujoco(tmp_path):
+    file, judged = tmp_path / "twins.json", {"ours": evaluation(0.9), "default": evaluation(0.4)}
+    rows = [{"env": CURL, "policy": "some", "judged": judged}]
+    file.write_text(json.dumps({"episodes": 50, "settings": {"default": {}}, "rows": rows}), encoding="utf-8")
+    text = program._elsewhere(CURL, file)
+    assert "Success of 50 episodes" in text
+    assert "| policy | ours | MuJoCo, default |" in text
+    assert "| some | 90.0% (89.0 to 91.0) | 40.0% (39.0 to 41.0) |" in text
+    assert program._elsewhere("rigid_env/BallKick-v0", file) == ""

@@ -12,6 +12,7 @@ import physics
 from physics.kernels.state import layout as at
 from physics.parallel.team import listed
 from rigid_env.envs.controllers import load_controller
+from rigid_env.suite.block_stack import BASE, MASS, STACKED
 from rigid_env.tasks import layout as col
 
 pytest.importorskip("mujoco")
@@ -74,7 +75,7 @@ def test_a_resting_block_rests_as_deep_as_the_softness_of_contacts_allows(settin
     assert info["physics_status"] == physics.Status.OK
 
 
-@pytest.mark.parametrize("env", twins.ORIGINALS)
+@pytest.mark.parametrize("env", ["rigid_env/BlockReach-v0", "rigid_env/BlockReorient-v0"])  # compiled tasks
 def test_rewards_and_success_are_the_tasks_function_of_the_state(env):
     """Each step of the twin, until the controller succeeds, is observed once more by the task of ours."""
     policy = load_controller(env)
@@ -107,16 +108,65 @@ def test_a_batch_is_its_single_worlds_and_forgets_earlier_episodes():
                 np.testing.assert_array_equal(single.step(action)[0], obs[world])
 
 
+def stack_of(*ratios, setting):
+    """A batch of twins of BlockStack whose cube has been let down onto the block, with these ratios of the masses."""
+    envs = gym.make_vec("twins/BlockStack-v0", num_envs=len(ratios), setting=setting)
+    envs.reset(seed=0, options={"mass[1]": MASS / np.array(ratios)})
+    world = envs.unwrapped.task.world
+    pos = world.pos.copy()
+    pos[:, 0] = 0.0, 0.5 * BASE[1] + STACKED, 0.0
+    world.set_state(pos=pos, quat=np.tile([1.0, 0.0, 0.0, 0.0], (len(ratios), 2, 1)))
+    return envs
+
+
+def test_drawn_masses_are_mujocos_and_the_next_episode_has_its_own():
+    """Moments of a block of mass m: m (b² + c²)/12, which MuJoCo sorts. Masses of different worlds do not mix."""
+    envs = stack_of(1.0, 100.0, setting="default")
+    x, y, z = BASE
+    moments = np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12.0
+    for masses in ([20.0, 0.2], [2.0, 20.0]):
+        envs.reset(seed=1, options={"mass[1]": masses})
+        envs.step(np.zeros((2, 6)))
+        for place, mass in zip(envs.unwrapped.task._advance._places, masses):
+            np.testing.assert_allclose(place.model.body_mass, [0.0, MASS, mass], rtol=1e-12)
+            np.testing.assert_allclose(np.sort(place.model.body_inertia[2]), mass * np.sort(moments), rtol=1e-12)
+
+
+@pytest.mark.parametrize("setting", twins.SETTINGS)
+def test_a_pile_carries_its_weights(setting):
+    """At rest the contacts of A carry m g upwards. Those of B carry M g: up from the floor, down from A.
+
+    After 2 s the rest of the motion is below 1e-3 of g.
+    """
+    ratios = np.array([1.0, 10.0])
+    envs = stack_of(*ratios, setting=setting)
+    for _ in range(39):
+        terminated = envs.step(np.zeros((2, 6)))[2]
+        assert not terminated.any()
+    force, impulse = envs.unwrapped.task.world.read_contact_sums()
+    weights = GRAVITY * np.stack([[MASS, MASS], MASS / ratios])  # by body and world
+    np.testing.assert_allclose(force[:, :, 1], weights.T, atol=1e-3 * GRAVITY * MASS)
+    np.testing.assert_allclose(force[:, :, ::2], 0.0, atol=1e-3 * GRAVITY * MASS)
+    np.testing.assert_allclose(impulse, 0.01 * force)
+    np.testing.assert_array_equal(envs.unwrapped.task.world.read_contact_sums([1])[0], force[1:])
+    envs.reset(seed=2)
+    assert not envs.unwrapped.task.world.read_contact_sums()[0].any()  # nothing has touched yet
+
+
 def test_a_twin_refuses_what_mujoco_would_not_get():
     env = "twins/BlockReach-v0"
     with pytest.raises(ValueError, match="setting is 'good'; allowed are default, best"):
         gym.make(env, setting="good")
     with pytest.raises(ValueError, match="effects of BlockReach contain Drag; allowed"):
         gym.make(env, effects=(physics.Drag(),))
-    drawn = gym.make(env, mass=(5.0, 7.0))
+    drawn = gym.make(env, friction=(0.3, 0.7))
     drawn.reset(seed=0)
-    with pytest.raises(ValueError, match=r"mass.*differs from the scene's; allowed"):
+    with pytest.raises(ValueError, match=r"friction.*differs from the scene's; allowed"):
         drawn.step(np.zeros(6))
+    larger = gym.make(env)
+    larger.reset(seed=0, options={"size": (5.0, 3.0, 2.5)})
+    with pytest.raises(ValueError, match=r"size.*differs from the scene's; allowed"):
+        larger.step(np.zeros(6))
     with pytest.raises(ValueError, match="env is 'rigid_env/BlockCurl-v0', without a twin; allowed are rigid_env/B"):
         twins.twin_id("rigid_env/BlockCurl-v0")
 
@@ -138,9 +188,9 @@ def test_the_program_judges_a_controller(tmp_path):
 
 
 def test_policies_follow_the_controller_of_their_environment():
-    reach, reorient = twins.ORIGINALS
+    reach, reorient, _ = twins.ORIGINALS
     given = [f"{reorient}=b.npz", f"{reach}=a.npz"]
-    found = judge_elsewhere.chosen(twins.ORIGINALS, given)
+    found = judge_elsewhere.chosen([reach, reorient], given)
     assert found == [(reach, "controller"), (reach, "a.npz"), (reorient, "controller"), (reorient, "b.npz")]
     for wrong in ("a.npz", f"{reorient}=b.npz", f"{reach}="):
         with pytest.raises(ValueError, match=f"policy is '{wrong}'; allowed is ID=FILE"):

@@ -132,6 +132,7 @@ CONTROLLERS = {
     "rigid_env/BallKick-v0": "rigid_env.suite.ball_kick:controller",
     "rigid_env/BallJuggle-v0": "rigid_env.suite.ball_juggle:controller",
     "rigid_env/BlockStack-v0": "rigid_env.suite.block_stack:controller",
+    "rigid_env/BlockPush-v0": "rigid_env.suite.block_push:controller",
     "rigid_env/BlockBalance-v0": "rigid_env.suite.block_balance:controller",
 }
 """Places of the controllers, ``module:function``, by the id of their environment."""

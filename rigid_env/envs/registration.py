@@ -23,6 +23,7 @@ SUITE = {
     "BallKick": 6,
     "BallJuggle": 300,
     "BlockStack": 240,
+    "BlockPush": 300,
     "BlockBalance": 240,
 }
 """Tasks of `rigid_env.suite`, and control steps of their episodes."""

@@ -8,5 +8,6 @@ RATES = {
     "BallKick": (0.95, 0.05),
     "BallJuggle": (1.0, 0.0),
     "BlockStack": (1.0, 0.0),
+    "BlockPush": (0.92, 0.03),
     "BlockBalance": (0.98, 0.0),
 }
