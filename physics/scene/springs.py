@@ -39,7 +39,7 @@ def check_ends(effect: Any, bodies: Sequence[Any]) -> None:
         if other is not None and not bodies[other].fixed:
             none += f": exchange the ends of the spring, with body={other} and an anchor in the world"
         raise ValueError(f"{name}.body is {effect.body}, a fixed body; {none}")
-    if other is not None and bodies[other].fixed:
+    if isinstance(effect, Spring) and other is not None and bodies[other].fixed:
         held = bodies[other]
         anchor = np.array(held.pos) + rotation_matrices(np.array(held.quat)) @ np.array(effect.anchor)
         raise ValueError(
