@@ -77,6 +77,8 @@ def read_scene(root: Element) -> Scene:
         if _type(plane) != "plane":
             raise _unread(plane, f"of the world is a {_type(plane)}; allowed are planes")
     elements, is_free = world.findall("body"), [_has_joint(body) for body in world.findall("body")]
+    if elements and not any(is_free):
+        raise _unread(elements[0], "is not a free body, nor is any other; allowed is at least one with a freejoint")
     meshes = {mesh.get("name"): mesh for mesh in root.iterfind("asset/mesh")}
     starts = iter(_starts(root, [element for element, free in zip(elements, is_free) if free]))
     bodies = [
