@@ -123,10 +123,14 @@ def test_the_tables_have_all_there_is():
 def test_entries_have_the_numbers_that_are_told():
     for name, numbers in rows("**Entries").items():
         entry = getattr(observe, name.partition("(")[0])
-        needed = {"drawn": ("goal",), "offset": (0, 1), "previous_action": (6,)}.get(entry.__name__, ())
+        needed = {
+            "drawn": ("goal",), "offset": (0, 1), "previous_action": (6,), "lidar": (0, ((1, 0, 0), (0, 1, 0)), 5.0),
+        }.get(entry.__name__, ())  # fmt: skip
         arguments = inspect.signature(entry).bind(*needed)
         arguments.apply_defaults()
-        assert len(entry(*needed).names) == (int(numbers) if numbers.isdigit() else arguments.arguments[numbers])
+        given = arguments.arguments.get(numbers)
+        count = int(numbers) if numbers.isdigit() else given if isinstance(given, int) else len(given)
+        assert len(entry(*needed).names) == count
 
 
 def test_worlds_are_told_in_full():

@@ -72,7 +72,8 @@ def every_public_object():
     world = physics.World(scenes.drop())
     world.keep_impacts()
     world.step()
-    yield from (world.read_contacts(), world.read_impacts())
+    yield from (world.read_contacts(), world.read_impacts(), world.cast_rays([(0, 9, 0)], [(0, -1, 0)]))
+    yield world.nearest_to(None, (0, 9, 0))
     yield physics.rollout(world, np.zeros((1, 3, 1, 6)), steps=3)
 
 
