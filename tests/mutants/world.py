@@ -144,4 +144,20 @@ IO = [
     ),
 ]
 
-WORLDS = [*WORLD, *IO]
+WORLDS = [*WORLD, *IO    _mutant(
+        "rays-missed-block",
+        "A ray hits a block that it passes by.",
+        "kernels/queries/ray_shapes.py",
+        "    if near > last or last < 0.0:",
+        "    if last < 0.0:",
+        "test_rays.py",
+    ),
+    _mutant(
+        "rays-inside",
+        "A ray from inside a sphere does not find where it leaves.",
+        "kernels/queries/ray_shapes.py",
+        "    side = -half if half <= -b else half",
+        "    side = -half",
+        "test_rays.py",
+    ),
+]
