@@ -144,7 +144,8 @@ IO = [
     ),
 ]
 
-WORLDS = [*WORLD, *IO    _mutant(
+QUERIES = [
+    _mutant(
         "rays-missed-block",
         "A ray hits a block that it passes by.",
         "kernels/queries/ray_shapes.py",
@@ -161,3 +162,5 @@ WORLDS = [*WORLD, *IO    _mutant(
         "test_rays.py",
     ),
 ]
+
+WORLDS = [*WORLD, *IO, *QUERIES]
