@@ -31,7 +31,7 @@ TASKS = [
         "tasks-body",
         "A parameter that is drawn for one body is given to all.",
         "rigid_env/tasks/draws.py",
-        "table[:, body] = value",
+        "table[:, place] = value",
         "table[...] = value[:, None]",
         "tasks/test_functions.py::test_a_parameter_of_one_body_leaves_the_others",
     ),

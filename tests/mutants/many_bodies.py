@@ -181,8 +181,8 @@ STEPPING = [
         "stepping-landing",
         "Bodies land in others that they pass.",
         "stepping/passing_pairs.py",
-        "(c not in (a, b) and d not in (a, b)) or many.contacts.target[k, 0] == _PASSING:",
-        "(c not in (a, b) and d not in (a, b)):",
+        "if not _is_beside_pair(k, a, b, many) or many.contacts.target[k, 0] == _PASSING:",
+        "if not _is_beside_pair(k, a, b, many):",
         _CASE + "[59-seams]",
     ),
     _mutant(
