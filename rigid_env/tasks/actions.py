@@ -212,7 +212,7 @@ def check_movable(acting, bodies) -> None:
     """
     movable = ", ".join(str(b) for b, body in enumerate(bodies) if not body.fixed)
     if acting.body >= len(bodies):
-        raise ValueError(f"body of {acting!r} is {acting.body}; allowed are {movable}")
+        raise ValueError(f"body of {acting!r} is {acting.body}; allowed are 0 to {len(bodies) - 1}")
     if bodies[acting.body].fixed:
         raise ValueError(f"body of {acting!r} is {acting.body}, which is fixed; allowed are {movable}")
 
