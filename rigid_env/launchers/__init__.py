@@ -1,7 +1,8 @@
-"""Places where many jobs run: processes of this machine, a Ray cluster, Slurm, or a shell.
+"""Launchers of many jobs: in processes of this machine, on a Ray cluster, on Slurm, or as lines for a shell.
 
-To add one: write a function as `local.launch` in a module here, and name the module in `LAUNCHERS`. It yields the end
-of each job as it comes, in any order, and starts a job again whose process or machine was lost.
+To add one, write a function like `local.launch` in a new module of this package, and name the module in `LAUNCHERS`.
+The function yields the end of each job as soon as the job ends, in any order. It restarts a job if the job's process or
+machine was lost.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ LAUNCHERS = {"local": "local", "ray": "ray_tasks", "submitit": "submitit_jobs", 
 
 
 def load(name: str) -> Launch:
-    """Return the function that runs jobs at a place, by a name of `LAUNCHERS`.
+    """Return the launch function of a name in `LAUNCHERS`.
 
     Raises
     ------
     ValueError
-        If there is no such place.
+        If there is no such launcher.
     """
     if name not in LAUNCHERS:
         raise ValueError(f"launcher is {name!r}; allowed are {', '.join(LAUNCHERS)}")

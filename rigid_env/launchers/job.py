@@ -1,4 +1,4 @@
-"""A job: a call that may run in any process of any machine, and how it ends."""
+"""Job: a call that may run in any process of any machine, and the record of its end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-RETRIES = 3  # of a job whose process or machine is lost
+RETRIES = 3  # restarts of a job whose process or machine is lost
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,12 @@ class Job:
     ----------
     name : str
     call : callable
-        Takes nothing, can be pickled, and returns something that can be pickled and is not None.
+        Function without arguments that can be pickled. Its result can be pickled, too, and is not None.
     command : str
-        A line for a shell that does the same.
+        Shell command that does the same.
     warm : callable, optional
-        Compiles or loads the kernels that `call` needs; a cluster runs it once on each node before its first job.
+        Function that compiles or loads the kernels of `call`. A cluster runs it once on each node, before the node's
+        first job.
     """
 
     name: str
@@ -32,11 +33,11 @@ class Job:
 
 
 class Stopped(Exception):
-    """A scheduler has ended a job; the message says which, and where."""
+    """Error by which a job reports that a scheduler has ended it; the message names the scheduler and the place."""
 
 
 class Ended(NamedTuple):
-    """End of a job: what its call returned; or None, with an error in one line or the message of a scheduler."""
+    """End of a job: the result of its call, or None with an error in one line or the message of a scheduler."""
 
     name: str
     result: Any
@@ -45,28 +46,29 @@ class Ended(NamedTuple):
 
 
 class Launch(Protocol):
-    """Run jobs, some at once.
+    """Function that runs jobs, at most `at_once` at the same time.
 
     Parameters
     ----------
     jobs : sequence of Job
     folder : Path
-        Where a launcher may keep files of its own, such as logs.
+        Folder for a launcher's own files, such as logs.
     at_once : int
+        Jobs that run at the same time.
     address : str, optional
-        Of a cluster; each launcher says what it means.
+        Address of a cluster; each launcher documents its form.
 
     Yields
     ------
     Ended
-        One for each job, as it ends.
+        End of each job, as soon as it ends.
     """
 
     def __call__(self, jobs: Sequence[Job], folder: Path, at_once: int, address: str | None) -> Iterator[Ended]: ...
 
 
 def run_job(job: Job) -> Ended:
-    """Call a job; its error is its end, so that the others go on. Only Ctrl-C ends more than the job."""
+    """Call a job, and return an exception as its end, so that other jobs continue. Only Ctrl-C ends them all."""
     try:
         return Ended(job.name, job.call())
     except Stopped as stop:
@@ -76,6 +78,6 @@ def run_job(job: Job) -> Ended:
 
 
 def _told(error: Exception) -> str:
-    """Return an error as one line."""
+    """Text of an error in one line."""
     words = " ".join(str(error).split())
     return words if isinstance(error, ValueError) else f"{type(error).__name__}: {words}"

@@ -1,4 +1,4 @@
-"""Jobs in processes of this machine."""
+"""Launcher of jobs in processes of this machine."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rigid_env.launchers.job import RETRIES, Ended, Job, run_job
 
 
 def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None = None) -> Iterator[Ended]:
-    """See `job.Launch`; `folder` and `address` are not used.
+    """Run jobs in worker processes, as `job.Launch` describes; `folder` and `address` are not used.
 
-    A process that dies takes the jobs of the others with it. All that had not ended are started again.
+    If one process dies, the pool loses the jobs of all its processes. All jobs that had not ended are then restarted.
     """
     left = {job.name: job for job in jobs}
     for _ in range(1 + RETRIES):
@@ -35,7 +35,7 @@ def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None 
 
 
 def _end_with_parent() -> None:
-    """Let this process end as soon as the one that started it has."""
+    """Start a thread that ends this process as soon as its parent process has ended."""
 
     def watch() -> None:
         multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])

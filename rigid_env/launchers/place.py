@@ -1,4 +1,4 @@
-"""A launcher with its settings."""
+"""Launcher together with its settings."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Place:
     launcher : str
         A name of `LAUNCHERS`.
     folder : Path
-        For what the jobs write.
+        Folder for files that the jobs write.
     at_once : int
         Jobs that run at the same time.
     address : str, optional
-        Of a cluster, see `job.Launch`.
+        Address of a cluster, see `job.Launch`.
 
     Raises
     ------
@@ -41,14 +41,14 @@ class Place:
 
     @property
     def is_printed(self) -> bool:
-        """True if jobs are only printed, so that none ends."""
+        """True if jobs are only printed; then no job ever ends."""
         return self.launcher == "print"
 
     def run(self, jobs: Sequence[Job]) -> Iterator[Ended]:
-        """Run jobs, and yield the end of each as it comes, in any order."""
+        """Run jobs, and yield the end of each as soon as it ends, in any order."""
         return self.launch(jobs, self.folder, self.at_once, self.address)
 
     @property
     def launch(self) -> Launch:
-        """Function of the launcher."""
+        """Launch function of the launcher."""
         return load(self.launcher)

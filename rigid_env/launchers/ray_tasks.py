@@ -1,4 +1,4 @@
-"""Jobs as tasks of a Ray cluster."""
+"""Launcher of jobs as tasks of a Ray cluster."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from rigid_env.launchers.job import RETRIES, Ended, Job, run_job
 
 
 def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None = None) -> Iterator[Ended]:
-    """See `job.Launch`; `address` is that of a cluster, None: one of this machine, of `at_once` processors.
+    """Run jobs as tasks of a Ray cluster, as `job.Launch` describes; `folder` is not used.
 
-    A task takes one processor. Ray starts one whose worker or node is lost again. One task warms the kernels of each
-    node first. `folder` is not used.
+    `address` is the address of a cluster; None starts a cluster on this machine with `at_once` processors. A task takes
+    one processor. Ray restarts a task whose worker or node is lost. Before the first job, one task per node warms its
+    kernels.
     """
     require("ray", "ray", purpose="--launcher ray")
     with connected(at_once, address):
@@ -23,7 +24,7 @@ def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None 
 
 @contextmanager
 def connected(at_once: int, address: str | None) -> Iterator[None]:
-    """Connect to a cluster while the block runs; to that of the program where it has one already."""
+    """Context manager that connects to a cluster; a connection that this program already has is used and kept."""
     import ray
 
     is_ours = not ray.is_initialized()
@@ -38,7 +39,7 @@ def connected(at_once: int, address: str | None) -> Iterator[None]:
 
 
 def run(jobs: Sequence[Job]) -> Iterator[Ended]:
-    """Run jobs as tasks of the cluster that this program is connected to, and yield the end of each as it comes."""
+    """Run jobs as tasks of the connected cluster, and yield the end of each as soon as it ends."""
     import ray
 
     _warm_nodes(jobs)
@@ -54,7 +55,7 @@ def run(jobs: Sequence[Job]) -> Iterator[Ended]:
 
 
 def _warm_nodes(jobs: Sequence[Job]) -> None:
-    """Warm the kernels of the first job that says how, on every node that is alive."""
+    """Warm kernels on every living node, by the first job that has a `warm` function."""
     import ray
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 

@@ -1,4 +1,4 @@
-"""Jobs of a Slurm cluster, or of this machine, by submitit."""
+"""Launcher of jobs on a Slurm cluster, or in processes of this machine, through submitit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ MINUTES = 24 * 60  # longest time of a job [min]
 
 
 def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None = None) -> Iterator[Ended]:
-    """See `job.Launch`; `address` is a partition of Slurm, or ``local`` for processes of this machine."""
+    """Run jobs through submitit, as `job.Launch` describes.
+
+    `address` is a partition of Slurm, or ``local`` for processes of this machine.
+    """
     require("submitit", purpose="--launcher submitit")
     import submitit
 
@@ -37,6 +40,6 @@ def launch(jobs: Sequence[Job], folder: Path, at_once: int, address: str | None 
             job = running.pop(name)
             try:
                 yield job.result()
-            except Exception as error:  # of a job that was lost: what submitit raises is its own
+            except Exception as error:  # the job was lost; submitit raises exceptions of its own classes
                 yield Ended(name, None, str(error).strip().splitlines()[-1])
         time.sleep(POLL_EVERY if running else 0.0)
