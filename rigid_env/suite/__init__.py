@@ -1,5 +1,6 @@
-"""The suite of environments: one file each, with its task, its documentation and a controller written by hand.
+"""Suite of environments: one file for each, with the task, its documentation and a handwritten controller.
 
-`SUITE` names them. To add one: write a file as `block_curl.py` (a subclass of `rigid_env.Task` whose docstring follows
-Gymnasium's form, and ``controller``, if a hand can write one), and name it in `rigid_env.envs.registration.SUITE`.
+`SUITE` lists them. To add one, write a file like `block_curl.py`, and add it to `rigid_env.envs.registration.SUITE`.
+The file contains a subclass of `rigid_env.Task` whose docstring follows Gymnasium's form, and ``controller``, if a
+handwritten one is feasible.
 """

@@ -1,4 +1,4 @@
-"""BallJuggle: keep a ball bouncing on a block that hangs on springs, up to a height that is told."""
+"""BallJuggle: keep a ball bouncing on a block that hangs on springs, up to a given height."""
 
 from __future__ import annotations
 
@@ -13,28 +13,29 @@ SIDE, THICKNESS, BLOCK_MASS = 0.8, 0.2, 4.0  # [m], [m], [kg]
 RADIUS, BALL_MASS = 0.08, 0.2  # [m], [kg]
 TOUCHING = THICKNESS / 2 + RADIUS  # height of the ball's centre over that of a level block, when they touch [m]
 RESTITUTION, FRICTION = (0.6, 0.9), 0.3
-RATE = 5.0  # of the block on its springs, up and down and sideways [rad/s]
+RATE = 5.0  # angular frequency of the block on its springs, vertically and sideways [rad/s]
 DAMPING = 3.0  # of each spring [N s/m]
 STRENGTH, TURNING = 2.0, 0.3  # longest force over the weight, longest torque over weight times half the side
-WANTED = (0.7, 1.3)  # height of the apex: the ball's centre over the block's place at rest [m]
-TOLERANCE = 0.05  # of an apex [m]
-CLEARANCE = 0.3  # gap between ball and block that an apex needs to count [m]
-APEXES = 4  # in a row that are a success
-FLYING = 0.02  # gap above which the flight is read [m]
-RELEASE = (0.6, 1.0)  # height of the ball at the start [m]
+WANTED = (0.7, 1.3)  # range of the wanted apex: height of the ball's centre over the block's place at rest [m]
+TOLERANCE = 0.05  # largest error of an apex that counts [m]
+CLEARANCE = 0.3  # least gap between ball and block at an apex that counts [m]
+APEXES = 4  # consecutive apexes that make a success
+FLYING = 0.02  # gap above which the ball's height and velocity give its apex [m]
+RELEASE = (0.6, 1.0)  # range of the ball's height at the start [m]
 ASIDE, DRIFT = 0.1, 0.15  # largest offset from the block's centre [m] and speed [m/s] at the start, x and z each
 LENGTH, BALL_SPEED, BALL_SPIN = 1.0, 5.0, 10.0  # units of the observation [m], [m/s], [rad/s]
-BLOCK_SPEED, BLOCK_SPIN, TILT = 2.0, 5.0, 0.5  # [m/s], [rad/s], [1]
-PRICES = {"apex": 1.0, "aside": 0.5, "drift": 0.25, "tilt": 0.5}  # of the potential [1/m], [1/m], [s/m], [1]
-APEX_BONUS = 0.5  # for each apex in a row
+BLOCK_SPEED, BLOCK_SPIN, TILT = 2.0, 5.0, 0.5  # further units of the observation [m/s], [rad/s], [1]
+PRICES = {"apex": 1.0, "aside": 0.5, "drift": 0.25, "tilt": 0.5}  # weights of the potential [1/m], [1/m], [s/m], [1]
+APEX_BONUS = 0.5  # gain of the potential for each consecutive apex
 
 # --- the controller ---------------------------------------------------------------------------------------
-MOST_MIRROR = 0.6  # speed of the block over that of the ball
-HEIGHT_GAIN, SPEED_GAIN = 200.0, 25.0  # of the block's motion [1/s²], [1/s]
-FOLLOW_GAIN, FOLLOW_DAMPING = 60.0, 14.0  # of the motion under the ball [1/s²], [1/s]
+MOST_MIRROR = 0.6  # largest speed of the block over that of the ball
+HEIGHT_GAIN, SPEED_GAIN = 200.0, 25.0  # gains of the block's vertical motion [1/s²], [1/s]
+FOLLOW_GAIN, FOLLOW_DAMPING = 60.0, 14.0  # gains of the motion that keeps the block under the ball [1/s²], [1/s]
 LEAN_BACK, LEAN_AGAINST = 0.06, 0.12  # tilt against an offset [1/m], against a drift [s/m]
 TURN_GAIN, TURN_DAMPING = 150.0, 22.0  # [1/s²], [1/s]
-SPRING_TURN = (RATE * SIDE / 2) ** 2 / ((SIDE**2 + THICKNESS**2) / 12.0)  # the springs' own, per tilt [1/s²]
+# angular acceleration by the springs, per tilt [1/s²]
+SPRING_TURN = (RATE * SIDE / 2) ** 2 / ((SIDE**2 + THICKNESS**2) / 12.0)
 
 
 def springs():
@@ -48,19 +49,19 @@ def springs():
 
 
 def gap(worlds):
-    """Gap between the ball and the plane of the block's top (n,) [m]."""
+    """Gap (n,) between the ball and the plane of the block's upper face [m]."""
     up = worlds.rotation[:, BLOCK, :, 1]
     return ((worlds.pos[:, BALL] - worlds.pos[:, BLOCK]) * up).sum(axis=1) - TOUCHING
 
 
 def apex_ahead(worlds):
-    """Height of the apex of the present flight, ahead or behind (n,) [m]; in a touch that of the last one."""
+    """Height (n,) of the apex of the present flight, past or to come [m]; during contact that of the last flight."""
     height = worlds.pos[:, BALL, 1] + worlds.linvel[:, BALL, 1] ** 2 / (2.0 * G)
     return np.where(gap(worlds) > FLYING, height, worlds.memory["apex"])
 
 
 class BallJuggle(Task):
-    """Keep a ball bouncing on a block, up to a height that is told.
+    """Keep a ball bouncing on a block, up to a given height.
 
     ## Description
 
@@ -137,7 +138,7 @@ class BallJuggle(Task):
     max_episode_steps = 300
 
     def place(self, drawn):
-        """Block at rest, ball above."""
+        """Start with the block at rest and the ball above it."""
         pos, linvel = np.zeros((2, len(drawn["release"]), 2, 3))
         pos[:, BALL, 1] = drawn["release"]
         pos[:, BALL, ::2], linvel[:, BALL, ::2] = drawn["aside"], drawn["drift"]
@@ -148,12 +149,12 @@ class BallJuggle(Task):
         return {"apex": apex_ahead(worlds)}
 
     def begin(self, worlds):
-        """Take the start as the first flight."""
+        """Store the apex of the first flight, and the potential of the start."""
         worlds.memory["apex"][:] = worlds.measured["apex"]
         worlds.memory["potential"][:] = self._potential(worlds)
 
     def update(self, worlds):
-        """Count apexes in a row: the ball has risen until this step, and falls now."""
+        """Count consecutive good apexes; an apex is a step at which the ball begins to fall."""
         memory, apex, speed = worlds.memory, worlds.measured["apex"], worlds.linvel[:, BALL, 1]
         memory["apex"][:] = apex
         is_apex = (memory["rise"] > 0.0) & (speed <= 0.0)
@@ -162,15 +163,15 @@ class BallJuggle(Task):
         memory["rise"][:] = speed
 
     def success(self, worlds):
-        """Enough apexes in a row."""
+        """Success: enough consecutive apexes were near the wanted height."""
         return worlds.memory["row"] >= APEXES
 
     def failure(self, worlds):
-        """Ball below the block."""
+        """Failure: the ball is below the block."""
         return worlds.pos[:, BALL, 1] < worlds.pos[:, BLOCK, 1]
 
     def _potential(self, worlds):
-        """Closeness to success (n,)."""
+        """Potential (n,) whose gain is rewarded: bonus for consecutive apexes, minus costs."""
         aside = np.linalg.norm(worlds.pos[:, BALL, ::2] - worlds.pos[:, BLOCK, ::2], axis=1)
         drift = np.linalg.norm(worlds.linvel[:, BALL, ::2], axis=1)
         miss = np.abs(worlds.memory["apex"] - worlds.drawn["wanted"])
@@ -179,21 +180,21 @@ class BallJuggle(Task):
         return APEX_BONUS * worlds.memory["row"] - costs
 
     def rewards(self, worlds):
-        """Gain of the potential, and the end."""
+        """Gain of the potential, penalty for a lost ball, and bonus for success."""
         before, now = worlds.memory["potential"], self._potential(worlds)
         progress = now - before
         before[:] = now
         return {"progress": progress, "lost": -1.0 * worlds.failure, "success": 2.0 * worlds.success}
 
     def goal_mark(self, world):
-        """A disc at the wanted apex, above the block."""
+        """Disc at the wanted apex, above the block."""
         x, _, z = self.world.pos[world, BLOCK]
         reached = abs(self.memory_arrays["apex"][world] - self.drawn["wanted"][world]) < TOLERANCE
         return {"pos": (x, self.drawn["wanted"][world], z), "radius": TOLERANCE, "reached": bool(reached)}
 
 
 def mirror_ratio(apex, wanted, restitution):
-    """Speed of the block over that of the ball, before an impact that sends the ball to the wanted apex.
+    """Compute the ratio of the block's speed to the ball's for an impact that sends the ball to the wanted apex.
 
     A free block of mass M that rises at v strikes a ball of mass m that falls at u. Newton's restitution and the
     momentum give the ball's speed after it,
@@ -219,7 +220,7 @@ def mirror_ratio(apex, wanted, restitution):
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Move the block as the mirror image of the ball about the height of impact, scaled so that the impact fits.
+    """Move the block as the scaled mirror image of the ball, about the height at which they collide.
 
     The mirror law is that of M. Buehler, D. E. Koditschek and P. J. Kindlmann, "Planning and control of robotic
     juggling and catching tasks", International Journal of Robotics Research 13 (1994). The block stays under the ball,
@@ -242,7 +243,7 @@ def controller(observations: np.ndarray) -> np.ndarray:
     lift = HEIGHT_GAIN * (place - pos[:, 1]) + SPEED_GAIN * (-ratio * velocity[:, 1] - speed[:, 1]) + ratio * G
     aside, drift = offset[:, ::2], velocity[:, ::2]
     follow = FOLLOW_GAIN * aside + FOLLOW_DAMPING * (drift - speed[:, ::2])
-    force = np.stack([follow[:, 0], lift, follow[:, 1]], axis=1) + RATE**2 * pos  # the springs' share in the motion
+    force = np.stack([follow[:, 0], lift, follow[:, 1]], axis=1) + RATE**2 * pos  # cancels the springs' acceleration
     lean = -LEAN_BACK * aside - LEAN_AGAINST * drift
     turn = (TURN_GAIN * (lean - up) + SPRING_TURN * up)[:, ::-1] * (1.0, -1.0) - TURN_DAMPING * spin
     inertia = (SIDE**2 + THICKNESS**2) / 12.0

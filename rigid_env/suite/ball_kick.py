@@ -10,51 +10,52 @@ from rigid_env.tasks import Entry, Impulse, Task, Uniform, observe
 from rigid_env.tasks.replacing import replaced
 
 G = 9.81  # [m/s²]
-RADIUS, MASS = 0.11, 0.43  # of a football [m], [kg]
+RADIUS, MASS = 0.11, 0.43  # of a football: [m], [kg]
 DRAG, LIFT = 0.25, 1.0  # coefficients of `physics.Drag` and `physics.Magnus`
 DENSITY = 1.225  # of the air [kg/m³]
 POST = (0.3, 3.5, 0.8)  # edges [m]
-POST_SHARE = 0.45  # of the way to the ring at which the post stands
+POST_SHARE = 0.45  # share of the distance to the ring at which the post stands
 RING = 0.5  # radius of the ring [m]
 FLIGHT = 6  # control steps of the longest flight
-SPEED, TURN, BRUSH = 30.0, 14.0, 3.5  # speeds by the largest impulses: ahead, across, along the ball's back [m/s]
-SPIN_PER_BRUSH = 1.0 / (0.4 * RADIUS)  # spin that a stroke leaves over the change of speed [1/m]
+# changes of speed by the largest impulses: forward, sideways, and along the back of the ball [m/s]
+SPEED, TURN, BRUSH = 30.0, 14.0, 3.5
+SPIN_PER_BRUSH = 1.0 / (0.4 * RADIUS)  # spin by the impulse along the ball's back, over its change of speed [1/m]
 LENGTHS, SIDE = (20.0, 2.0, 3.0), 0.2  # units of the observation [m]
-VELOCITY, SPIN, WIND = 20.0, 50.0, 5.0  # the same [m/s], [rad/s], [m/s]
-HALF_MISS = 2.0  # miss that costs half of what the farthest one costs [m]
-AIMING_SPEED, AIMING_SPIN = 25.0, 75.0  # of the controller's kicks [m/s], [rad/s]
-SHOTS, PARTS = 8, 48  # of the controller's aim: shots, and parts of a flight
-CUTS = 20  # straight parts of the way in a control step
+VELOCITY, SPIN, WIND = 20.0, 50.0, 5.0  # further units of the observation [m/s], [rad/s], [m/s]
+HALF_MISS = 2.0  # miss at which half of the largest penalty is lost [m]
+AIMING_SPEED, AIMING_SPIN = 25.0, 75.0  # speed and spin of the controller's kicks [m/s], [rad/s]
+SHOTS, PARTS = 8, 48  # trial shots of the controller's aim, and integration steps of a flight
+CUTS = 20  # straight parts into which the path of a control step is cut
 
 
 def ring_offset(worlds):
-    """Centre of the ring minus centre of the ball, (n, 3) [m]."""
+    """Vector (n, 3) from the centre of the ball to the centre of the ring [m]."""
     return worlds.drawn["ring"] - worlds.pos[:, 0]
 
 
 def ring_entry(k):
-    """Entry of one axis of `ring_offset`, in its own unit."""
+    """Observation entry of axis `k` of `ring_offset`, in the unit of that axis."""
     return Entry(f"ring minus centre {'xyz'[k]}", "m", -5, 5, lambda w: ring_offset(w)[:, k], LENGTHS[k])
 
 
 def least_distance(places, velocities, time, point):
-    """Least distances of points from the ways of a ball, each a cubic between two places with their velocities.
+    """Least distances of points from the paths of a ball, each a cubic given by two positions and velocities.
 
-    The way is cut into `CUTS` straight parts. In free flight a part of 10 ms is off by a t²/8, less than 1 mm.
+    The path is cut into `CUTS` straight parts. In free flight a part of 10 ms deviates by a t²/8, less than 1 mm.
 
     Parameters
     ----------
     places, velocities : pair of (n, 3) float
-        At the start and at the end [m], [m/s].
+        Positions [m] and velocities [m/s] at the start and at the end.
     time : float
-        Between them [s].
+        Time between start and end [s].
     point : (n, 3) float
-        [m].
+        Points [m].
 
     Returns
     -------
     (n,) float
-        [m].
+        Distances [m].
     """
     s = np.linspace(0.0, 1.0, CUTS + 1)[:, None, None]
     (start, end), (first, last) = places, velocities
@@ -76,8 +77,9 @@ class BallKick(Task):
     post of 3.5 m hides the ring. Within 1.2 s the ball gets there only around the post, on a way that spin bends, or
     over it with topspin, where ring and wind allow it. Later actions have no effect.
 
-    Effects of other strength are arguments: `effects=[physics.Drag(0.0), physics.Magnus(0.0)]` is a flight without air.
-    `draws={"wind": (0.0, 0.0)}` is a calm. A `physics.Wind` in `effects` needs such a fixed draw, and replaces it.
+    The argument `effects` changes the strength of effects: `effects=[physics.Drag(0.0), physics.Magnus(0.0)]` gives a
+    flight without air. `draws={"wind": (0.0, 0.0)}` is a calm. A `physics.Wind` in `effects` needs such a fixed draw,
+    and replaces it.
 
     ## Rewards
 
@@ -92,9 +94,9 @@ class BallKick(Task):
 
     ## Episode End
 
-    Success: the centre of the ball has come within 0.5 m of the centre of the ring. The way between two control steps
-    is the cubic that their places and velocities make. Failure: the ball is past the ring, or 6 control steps (1.2 s)
-    are over. `info` holds `miss`, the least distance so far [m].
+    Success: the centre of the ball has come within 0.5 m of the centre of the ring. The path between two control steps
+    is the cubic given by the positions and velocities at both. Failure: the ball is past the ring, or 6 control steps
+    (1.2 s) are over. `info` holds `miss`, the least distance so far [m].
 
     ## Version History
 
@@ -143,7 +145,7 @@ class BallKick(Task):
         super().__init__(worlds, frame_skip=frame_skip, dt=dt, **settings)
 
     def place(self, drawn):
-        """Stand the post near the line between ball and ring."""
+        """Place the post near the line between ball and ring."""
         ring = drawn["ring"]
         pos = np.zeros((len(ring), 2, 3))
         pos[:, 0, 1], pos[:, 1, 1] = RADIUS, POST[1] / 2
@@ -152,7 +154,7 @@ class BallKick(Task):
         return {"pos": pos}
 
     def begin(self, worlds):
-        """Let the wind of these episodes blow, unless `effects` hold another one."""
+        """Set the wind that the new episodes have drawn, unless `effects` fix the wind."""
         given = replaced(self.effects).get("wind")
         if given is None:
             worlds.memory["wind"][:] = worlds.drawn["wind"]
@@ -163,7 +165,7 @@ class BallKick(Task):
         worlds.memory["miss"][:] = worlds.measured["miss"]
 
     def measure(self, worlds):
-        """Least distance between ball and ring so far."""
+        """Least distance between the centres of ball and ring so far."""
         ball, memory = worlds.pos[:, 0], worlds.memory
         if not worlds.steps.any():  # episodes begin
             return {"miss": np.linalg.norm(ring_offset(worlds), axis=1)}
@@ -172,22 +174,22 @@ class BallKick(Task):
         return {"miss": np.minimum(memory["miss"], way)}
 
     def update(self, worlds):
-        """Note where the ball is, and take the kick away."""
+        """Store position, velocity and miss, and set the limits of the actions to 0 after the kick."""
         worlds.memory["place"][:], worlds.memory["velocity"][:] = worlds.pos[:, 0], worlds.linvel[:, 0]
         worlds.memory["miss"][:] = worlds.measured["miss"]
         self.limits[worlds.indices[worlds.steps >= 1]] = 0.0
 
     def success(self, worlds):
-        """Through the ring."""
+        """Success: the ball has passed through the ring."""
         return worlds.measured["miss"] < RING
 
     def failure(self, worlds):
-        """Past the ring, or too late."""
+        """Failure: the ball is past the ring, or the longest flight is over."""
         is_past = worlds.pos[:, 0, 0] > worlds.drawn["ring"][:, 0]
         return ~worlds.success & (is_past | (worlds.steps >= FLIGHT))
 
     def rewards(self, worlds):
-        """A hit, or minus the miss, once the flight is over."""
+        """Reward at the end of the flight: 1 for a hit, minus a function of the miss, else 0."""
         miss = worlds.measured["miss"] / (worlds.measured["miss"] + HALF_MISS)
         return {
             "miss": np.where(worlds.success | worlds.failure, -miss, 0.0),
@@ -195,27 +197,27 @@ class BallKick(Task):
         }
 
     def goal_mark(self, world):
-        """A disc of the ring's radius, on the ground below it."""
+        """Disc of the ring's radius, on the ground below it."""
         is_reached = bool(self.memory_arrays["miss"][world] < RING)
         return {"pos": tuple(self.drawn["ring"][world]), "radius": RING, "reached": is_reached}
 
 
 def fly(velocity, spin, wind, distance):
-    """Flight of a ball to the plane at a distance ahead, by the midpoint rule in equal parts of the way.
+    """Flight of a ball to a plane at some distance ahead, by the midpoint rule in equal parts of that distance.
 
     Parameters
     ----------
     velocity, spin, wind : (n, 3) float
-        At the kick [m/s], [rad/s], and of the air [m/s].
+        Velocity [m/s] and spin [rad/s] of the ball at the kick, and velocity of the air [m/s].
     distance : (n,) float
-        Along x [m].
+        Distance of the plane along x [m].
 
     Returns
     -------
     places : (PARTS + 1, n, 3) float
-        From the kick, after equal parts of the way along x [m].
+        Positions at the kick and after equal parts of the distance along x [m].
     duration : (n,) float
-        Of the flight [s].
+        Duration of the flight [s].
     """
     part = distance / PARTS
     place, duration = np.zeros_like(velocity), np.zeros_like(distance)
@@ -242,20 +244,20 @@ def acceleration(velocity, spin, wind):
 
 
 def aim(ring, spin, wind):
-    """Velocity of a kick with a given spin that meets the ring, and the way of the ball.
+    """Compute the velocity of a kick with a given spin that meets the ring, and the ball's path.
 
-    Each shot moves the point aimed at by the miss of the shot before. Drag and lift change little with the direction,
-    so that a miss shrinks several times with each shot.
+    Each shot moves the aiming point by the miss of the shot before. Drag and lift change little with the direction, so
+    that a miss shrinks several times with each shot.
 
     Parameters
     ----------
     ring, spin, wind : (n, 3) float
-        Centre of the ring seen from the ball [m], spin [rad/s], and velocity of the air [m/s].
+        Centre of the ring relative to the ball [m], spin [rad/s], and velocity of the air [m/s].
 
     Returns
     -------
     velocity : (n, 3) float
-        [m/s].
+        Velocity of the kick [m/s].
     places : (PARTS + 1, n, 3) float
         See `fly`.
     """

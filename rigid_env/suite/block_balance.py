@@ -13,22 +13,22 @@ from rigid_env.tasks import Entry, Gust, Push, Task, Wrench, observe
 G = 9.81  # [m/s²]
 MASS = 6.0  # [kg]
 TORQUE = 0.3  # longest torque over the weight times the longest half edge
-FALLEN = 0.5  # lean at which the block is given up [rad]
-START_LEAN = 0.05  # [rad]
-EFFORT_PRICE = 0.1  # of the squared action [1/s]
+FALLEN = 0.5  # tilt beyond which the episode fails [rad]
+START_LEAN = 0.05  # largest tilt at the start [rad]
+EFFORT_PRICE = 0.1  # weight of the squared action [1/s]
 SPEED, SPIN = 1.0, 2.0  # units of the observation [m/s], [rad/s]
-STIFFNESS, DAMPING = 10.0, 4.0  # of the controller: shares of the torque limit per radian and per rad/s
+STIFFNESS, DAMPING = 10.0, 4.0  # gains of the controller: shares of the torque limit per radian and per rad/s
 
 
 class Stance(NamedTuple):
-    """Block, and the edge or vertex on which it stands.
+    """Shape of the block, and the edge or vertex on which it stands.
 
     Attributes
     ----------
     size : (3,) tuple
         Edges of the block [m].
     arm : (3,) tuple
-        From the contact to the centre, body frame [m].
+        Vector from the contact to the centre, body frame [m].
     """
 
     size: tuple[float, float, float]
@@ -49,7 +49,7 @@ STANCES = {
     "edge": Stance((1.0, 0.6, 0.4), (0.5, 0.3, 0.0)),
     "vertex": Stance((1.0, 1.0, 1.0), (0.5, 0.5, 0.5)),
 }
-"""The block on an edge along its z axis, and the cube on a vertex."""
+"""Block on an edge along its z axis, and cube on a vertex."""
 
 
 class BlockBalance(Task):
@@ -111,7 +111,7 @@ class BlockBalance(Task):
         super().__init__(worlds, frame_skip=frame_skip, dt=dt, **settings)
 
     def make_scene(self, distributions):
-        """The block above a floor."""
+        """Scene of the block above a floor."""
         return physics.Scene(
             bodies=[physics.Block(size=self.stance.size, mass=MASS, pos=(0.0, self.stance.height, 0.0))],
             walls=[physics.HalfSpace((0.0, 1.0, 0.0), 0.0)],
@@ -119,7 +119,7 @@ class BlockBalance(Task):
         )
 
     def place(self, drawn):
-        """Upright, then leaned about z, then turned about the vertical: the contact stays the lowest point."""
+        """Pose of the start: upright, then leaned about z, then turned about the vertical; the contact stays lowest."""
         lean, yaw = drawn["start_lean"], drawn["yaw"]
         zero = np.zeros_like(lean)
         leaned = np.stack([np.cos(lean / 2), zero, zero, np.sin(lean / 2)], axis=-1)
@@ -128,45 +128,45 @@ class BlockBalance(Task):
         return {"pos": np.stack([zero, self.stance.height * np.cos(lean), zero], axis=-1), "quat": quat}
 
     def begin(self, worlds):
-        """Note the axis."""
+        """Store the direction (3,) from the contact to the centre, world frame."""
         worlds.memory["axis"][:] = worlds.rotation[:, 0] @ self.stance.axis
 
     update = begin
 
     def measure(self, worlds):
-        """Angle between the axis and the vertical, and the time so far."""
+        """Angle between the vertical and the line from contact to centre, and the time since the start."""
         height = (worlds.rotation[:, 0] @ self.stance.axis)[:, 1]
         return {"lean": np.arccos(np.clip(height, -1.0, 1.0)), "upright": worlds.time}
 
     def success(self, worlds):
-        """Upright for the whole episode."""
+        """Success: the block has not fallen until the end of the episode."""
         return (worlds.steps >= self.max_episode_steps) & ~self.failure(worlds)
 
     def failure(self, worlds):
-        """It falls."""
+        """Failure: the block has fallen."""
         return worlds.measured["lean"] > FALLEN
 
     def rewards(self, worlds):
-        """Time upright, less the effort."""
+        """Time upright, minus the effort."""
         effort = (worlds.action**2).sum(axis=1)
         return {"upright": self.control_dt * ~worlds.failure, "effort": -EFFORT_PRICE * self.control_dt * effort}
 
 
 def upright(axis: np.ndarray) -> np.ndarray:
-    """Quaternion of the shortest turn from a unit vector to the vertical."""
+    """Quaternion of the shortest rotation from a unit vector to the vertical."""
     quat = np.array([1.0 + axis[1], -axis[2], 0.0, axis[0]])  # 1 + a·y, a × y
     return quat / np.linalg.norm(quat)
 
 
 def product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Product (..., 4) of quaternions w, x, y, z: first the turn q, then p."""
+    """Product (..., 4) of quaternions w, x, y, z: rotation q, then rotation p."""
     vector = p[..., :1] * q[..., 1:] + q[..., :1] * p[..., 1:] + np.cross(p[..., 1:], q[..., 1:])
     scalar = p[..., 0] * q[..., 0] - (p[..., 1:] * q[..., 1:]).sum(axis=-1)
     return np.concatenate([scalar[..., None], vector], axis=-1)
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Turn the axis into the vertical: a spring and a damper, in the frame of the world.
+    """Turn the line from contact to centre towards the vertical by a spring and a damper, in the world frame.
 
     Parameters
     ----------

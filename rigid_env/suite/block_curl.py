@@ -15,15 +15,15 @@ NEAREST, FARTHEST = 1.0, 4.0  # distance of the mark at the start [m]
 FRICTION = (0.15, 0.4)
 TOLERANCE = 0.2  # distance from the mark at rest that is a success [m]
 AT_REST = 1e-3  # speed below which the stone has stopped [m/s]
-HIT = 1.0  # what a hit earns
-EFFORT_PRICE = 0.1  # of the integral of (force over weight)² [1/s]
+HIT = 1.0  # reward of a hit
+EFFORT_PRICE = 0.1  # weight of the integral of (force over weight)² [1/s]
 LENGTH, SPEED = 5.0, 5.0  # units of the observation [m], [m/s]
-HALVINGS = 50  # of the interval in which the slide's duration is sought: 2^-50 of 10 s
+HALVINGS = 50  # bisections of the interval in which the slide's duration is sought: 2^-50 of 10 s
 LONGEST_SLIDE = 10.0  # [s]
 
 
 class Ring(Distribution):
-    """Places x, z on a ring about the origin, each as likely as the other [m]."""
+    """Places x, z on a ring about the origin, uniform over its area [m]."""
 
     length, uniforms = 2, 2
 
@@ -39,10 +39,11 @@ class Ring(Distribution):
 
 
 def best_push(distance, speed, friction, left):
-    """Force that brings a stone to rest at a distance with the least effort, in closed form but for one root.
+    """Compute the force that brings a stone to rest at a distance with the least effort.
 
-    Pushed for T = `left`, then sliding for a time s, the stone stops with v(T) = μ g s. Of all forces f(t) over the
-    weight that stop it there, Lagrange's condition picks f(t) = κ ((T - t) + s), which falls in a line; with
+    The solution is a closed form, apart from one root. Pushed for T = `left`, then sliding for a time s, the stone
+    stops with v(T) = μ g s. Of all forces f(t) over the weight that stop it there, Lagrange's condition picks f(t) = κ
+    ((T - t) + s), which decreases linearly; with
 
         μ g s = v + g κ T (T/2 + s) - μ g T
         distance = v T + g κ (T³/3 + s T²/2) - μ g T²/2 + μ g s²/2
@@ -52,14 +53,14 @@ def best_push(distance, speed, friction, left):
     Parameters
     ----------
     distance, speed, friction, left : (n,) float
-        To the mark [m], towards it [m/s], coefficient, and time that is left to push [s].
+        Distance to the mark [m], speed towards it [m/s], friction coefficient, and time left to push [s].
 
     Returns
     -------
     force : (n,) float
-        Over the weight, now; negative to brake.
+        Present force over the weight; negative to brake.
     effort : (n,) float
-        Integral of its square until the push ends [s].
+        Integral of the squared force over the weight until the push ends [s].
     """
     low, high = np.zeros_like(distance), np.full_like(distance, LONGEST_SLIDE)
     for _ in range(HALVINGS):
@@ -87,12 +88,12 @@ def best_return(goal, friction, duration):
 
 
 def mark_offset(worlds):
-    """Mark minus centre, x and z, (n, 2) [m]."""
+    """Vector (n, 2) from the stone's centre to the mark, x and z [m]."""
     return worlds.drawn["goal"] - worlds.pos[:, 0, ::2]
 
 
 def miss_offset(worlds):
-    """Mark minus the place where a stone that slides alone would stop, x and z, (n, 2) [m]."""
+    """Vector (n, 2) from the point where the stone would stop without a push to the mark, x and z [m]."""
     velocity = worlds.linvel[:, 0, ::2]
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     return mark_offset(worlds) - velocity * speed / (2.0 * G * worlds.drawn["friction"][:, None])
@@ -145,7 +146,7 @@ class BlockCurl(Task):
     max_episode_steps = 200
 
     def measure(self, worlds):
-        """Distance and miss, and what the agent has lost against the best push so far."""
+        """Distance and miss [m], and the regret: largest possible return minus the return so far."""
         goal, friction = worlds.drawn["goal"], worlds.drawn["friction"]
         distance, miss = (np.linalg.norm(part, axis=1) for part in (mark_offset(worlds), miss_offset(worlds)))
         hit = np.where(self._has_stopped(worlds) & (distance < TOLERANCE), HIT, 0.0)
@@ -156,11 +157,11 @@ class BlockCurl(Task):
         }  # fmt: skip
 
     def begin(self, worlds):
-        """Remember the miss of a stone that is not pushed."""
+        """Store the miss of a stone that is not pushed."""
         worlds.memory["miss"][:] = worlds.measured["miss"]
 
     def update(self, worlds):
-        """Add the effort of this step, and take the push away once its time is over."""
+        """Add the effort of this step, and set the limits of the actions to 0 after the push."""
         worlds.memory["effort"] += self._effort(worlds)
         self.limits[worlds.indices[worlds.steps >= PUSHED]] = 0.0
 
@@ -169,32 +170,32 @@ class BlockCurl(Task):
         return self.control_dt * ((worlds.wrench[:, 0, :3] / worlds.weight[:, :1]) ** 2).sum(axis=1)
 
     def _has_stopped(self, worlds):
-        """(n,) bool: after the push, at rest."""
+        """Flags (n,) bool of stones that are at rest after the push."""
         return (worlds.steps >= PUSHED) & (np.linalg.norm(worlds.linvel[:, 0], axis=1) < AT_REST)
 
     def success(self, worlds):
-        """Stopped on the mark."""
+        """Success: the stone has stopped on the mark."""
         return self._has_stopped(worlds) & (worlds.measured["distance"] < TOLERANCE)
 
     def failure(self, worlds):
-        """Stopped elsewhere."""
+        """Failure: the stone has stopped elsewhere."""
         return self._has_stopped(worlds) & (worlds.measured["distance"] >= TOLERANCE)
 
     def rewards(self, worlds):
-        """Gain towards the mark, effort and hit."""
+        """Decrease of the miss, cost of the effort, and bonus for a hit."""
         before, now = worlds.memory["miss"], worlds.measured["miss"]
         nearer = before - now
         before[:] = now
         return {"nearer": nearer, "effort": -EFFORT_PRICE * self._effort(worlds), "success": HIT * worlds.success}
 
     def goal_mark(self, world):
-        """A disc of the tolerance."""
+        """Disc of the tolerance at the mark."""
         x, z = self.drawn["goal"][world]
         return {"pos": (x, 0.0, z), "radius": TOLERANCE, "reached": False}
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Play the best push, worked out anew in each control step from where the stone is.
+    """Apply the best push, computed anew in each control step from the present state of the stone.
 
     Parameters
     ----------

@@ -15,22 +15,22 @@ REACH = float(HALF.max())  # [m]
 THRUST = 2.0  # longest force over the weight m g
 TWIST = 1.0  # longest torque over m g times the longest half edge
 BUDGET = 2.5  # integral of thrust and twist over the episode [m g s]
-HEIGHT = (7.0, 10.0)  # of the centre at the start [m]
-SLOWEST, FASTEST = (-3.0, 0.0, -3.0), (3.0, 4.0, 3.0)  # velocity at the start [m/s]
-SPIN = 2.0  # of each axis at the start, at most [rad/s]
+HEIGHT = (7.0, 10.0)  # range of the centre's height at the start [m]
+SLOWEST, FASTEST = (-3.0, 0.0, -3.0), (3.0, 4.0, 3.0)  # least and largest velocity at the start [m/s]
+SPIN = 2.0  # largest spin about each axis at the start [rad/s]
 
 # --- success ----------------------------------------------------------------------------------------------
 FLAT = 0.03  # angle between the target face's normal and straight down [rad]
-TOUCH = 0.03  # gap to the floor [m]
+TOUCH = 0.03  # largest gap to the floor at rest [m]
 REST_SPEED, REST_SPIN = 0.1, 0.1  # [m/s], [rad/s]
-HOLD_STEPS = 5  # control steps in a row
+HOLD_STEPS = 5  # consecutive control steps
 
 # --- rewards ----------------------------------------------------------------------------------------------
 TURN_VALUE = 1.0  # potential lost per radian off the target [1/rad]
 CALM_VALUE = 0.1  # potential lost per m/s and rad/s with the face down ...
-CALM_RANGE = 0.3  # ... and 1/e of that at this angle [rad]
+CALM_RANGE = 0.3  # ... and 1/e of that loss at this angle [rad]
 HOLD_VALUE = 1.0  # potential of a completed hold
-PEAK_PRICE = 2.0  # of the largest impulse of an impact [1/(m g s)]
+PEAK_PRICE = 2.0  # weight of the largest impulse of an impact [1/(m g s)]
 STEP_COST = 0.02
 SUCCESS_BONUS = 5.0
 
@@ -52,7 +52,7 @@ class Attitude(Distribution):
 
 
 def potential(worlds):
-    """Value of a state, whose gain is rewarded, (n,)."""
+    """Potential (n,) of the states, whose gain is rewarded."""
     angle, calm = worlds.measured["angle"], worlds.measured["speed"] + worlds.measured["spin"]
     held = HOLD_VALUE * worlds.memory["held"] / HOLD_STEPS
     return held - TURN_VALUE * angle - CALM_VALUE * calm * np.exp(-angle / CALM_RANGE)
@@ -67,7 +67,7 @@ class BlockLand(Task):
     control step is 50 ms. The agent has a force of up to 2 m g at its centre and a torque of up to m g a, where a is
     the longest half edge. Both draw on one budget: force over m g plus torque over m g a, integrated over time, may
     reach 2.5 s. Hovering for 2.5 s takes all of it. Once less is left than a control step of full force and torque
-    would take, both are gone. The face that is down at the end counts, and the hardest blow on the way there.
+    would take, both are gone. The reward depends on the face that is down at the end, and on the hardest impact before.
 
     ## Rewards
 
@@ -126,13 +126,13 @@ class BlockLand(Task):
         super().__init__(worlds, frame_skip=frame_skip, **settings)
 
     def place(self, drawn):
-        """Over the origin, moving."""
+        """Start of the thrown block: above the origin, with the drawn attitude and velocities."""
         height = np.asarray(drawn["height"])
         pos = np.stack([np.zeros_like(height), height, np.zeros_like(height)], axis=1)
         return {"pos": pos, "quat": drawn["attitude"], "linvel": drawn["linvel"], "angvel": drawn["angvel"]}
 
     def measure(self, worlds):
-        """Angle of the target face, speeds, the hardest blow, and what is left to spend."""
+        """Angle of the target face, speed and spin, largest impact so far, and the rest of the budget."""
         blow = np.linalg.norm(worlds.impact_impulse[:, 0], axis=1) / worlds.weight[:, 0]
         down = -axes_of(worlds)[:, 1]
         return {
@@ -144,11 +144,11 @@ class BlockLand(Task):
         }
 
     def begin(self, worlds):
-        """Value of the start."""
+        """Store the potential of the start."""
         worlds.memory["potential"][:] = potential(worlds)
 
     def update(self, worlds):
-        """Count the spent impulse and the steps at rest; take thrust and twist away once the budget is spent."""
+        """Add the spent impulse and the steps at rest; set the limits of the actions to 0 once the budget is spent."""
         memory, measured = worlds.memory, worlds.measured
         memory["spent"] += self._spending(worlds)
         self.limits[worlds.indices[self._is_spent(worlds)]] = 0.0
@@ -158,26 +158,26 @@ class BlockLand(Task):
         memory["held"][:] = np.where(rests & (measured["angle"] <= FLAT), memory["held"] + 1, 0)
 
     def _spending(self, worlds):
-        """Impulse that the last action took from the budget, (n,) [m g s]."""
+        """Part (n,) of the budget that the last action took [m g s]."""
         thrust = np.linalg.norm(worlds.wrench[:, 0, :3], axis=1)
         twist = np.linalg.norm(worlds.wrench[:, 0, 3:], axis=1) / REACH
         return self.control_dt * (thrust + twist) / worlds.weight[:, 0]
 
     def _is_spent(self, worlds):
-        """(n,) bool: less is left than a control step may take."""
+        """Flags (n,) bool: less is left of the budget than one control step may take."""
         return worlds.memory["spent"] > BUDGET - self.control_dt * (THRUST + TWIST)
 
     def success(self, worlds):
-        """At rest on the target face for a quarter of a second."""
+        """Success: the block has rested on the target face for a quarter of a second."""
         return worlds.memory["held"] >= HOLD_STEPS
 
     def failure(self, worlds):
-        """At rest on another face as long, with nothing left to spend."""
+        """Failure: the block has rested on another face for a quarter of a second, and the budget is spent."""
         is_elsewhere = worlds.measured["angle"] > FLAT
         return self._is_spent(worlds) & (worlds.memory["still"] >= HOLD_STEPS) & is_elsewhere
 
     def rewards(self, worlds):
-        """Gain of the potential, price of the hardest blow, time, bonus."""
+        """Gain of the potential, cost of a larger impact, cost of time, and bonus for success."""
         memory, value = worlds.memory, potential(worlds)
         terms = {
             "progress": value - memory["potential"],
@@ -189,7 +189,7 @@ class BlockLand(Task):
         return terms
 
     def goal_mark(self, world):
-        """The target face."""
+        """The target face, as the goal to highlight."""
         return {
             "goal_face": int(self.drawn["target_face"][world]),
             "reached": self.memory_arrays["held"][world] > 0,
@@ -199,20 +199,20 @@ class BlockLand(Task):
 # --- controller -------------------------------------------------------------------------------------------
 UP = np.array((0.0, 1.0, 0.0))
 TURN_RATE = 4.0  # of the critically damped turn to the target [rad/s]
-HALF_TURN = 1e-3  # sine of the angle below which its axis is not determined
+HALF_TURN = 1e-3  # sine of the rotation angle below which the rotation's axis is not determined
 LATEST = 0.8  # mean deceleration over g at which braking begins; full thrust gives 1
-TOUCHDOWN = 0.15  # speed wanted at the floor [m/s]
-MARGIN, CLOSEST = 0.05, 0.03  # gap in which the block is to be that slow, least way to brake in [m]
-SIDEWAYS = 0.7  # time in which horizontal motion is braked [s]
-TURNED = 0.25  # angle within which the block is let down [rad]
-NEAR, LANDED = 0.3, 0.05  # gap below which a face that is not down yet needs lift, and below which thrust ends [m]
+TOUCHDOWN = 0.15  # desired speed at the floor [m/s]
+MARGIN, CLOSEST = 0.05, 0.03  # gap at which the block should have that speed, and least distance for braking [m]
+SIDEWAYS = 0.7  # time constant for braking horizontal motion [s]
+TURNED = 0.25  # angle to the target below which the block descends [rad]
+NEAR, LANDED = 0.3, 0.05  # gap below which a block that is not yet turned needs lift, and below which thrust ends [m]
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Turn the target face down on the way, brake as late as thrust allows, and let go once it has landed.
+    """Rotate the target face down during the fall, brake as late as thrust allows, and let go after the landing.
 
-    Late braking spends least, since each second of thrust carries the weight, too. The torque is that of a critically
-    damped turn, with the inertia of the block and the gyroscopic torque.
+    Late braking spends least of the budget, since each second of thrust also carries the weight. The torque is that of
+    a critically damped rotation, with the inertia of the block and the gyroscopic torque.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _turn(axes, half, spin):
     Parameters
     ----------
     axes : (n, 3, 3)
-        Of the block, a row for each, the target's normal first.
+        Axes of the block, a row for each, the target face's normal first.
     half : (n, 3)
         Half edges along them [m].
     spin : (n, 3)

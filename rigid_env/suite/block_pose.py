@@ -14,18 +14,19 @@ from rigid_env.tasks.kernels import start_poses
 # --- success ----------------------------------------------------------------------------------------------
 NEAR = 0.3  # horizontal distance of the centre from its place [m]
 FLAT = 0.1  # angle between the target face's normal and straight down [rad]
-AHEAD = 0.1  # turn about the vertical that is left [rad]
+AHEAD = 0.1  # error of the heading [rad]
 REST_SPEED, REST_SPIN = 0.1, 0.1  # [m/s], [rad/s]
-HOLD_STEPS = 10  # control steps in a row
+HOLD_STEPS = 10  # consecutive control steps
 
 # --- rewards ----------------------------------------------------------------------------------------------
 REACH_VALUE = 0.25  # potential lost per metre of distance [1/m]
 TILT_VALUE = 1.0  # potential lost per radian of tilt [1/rad]
-TURN_VALUE = 1.0  # potential lost per radian of the whole turn that is left [1/rad]
-FINE_VALUE = 0.5  # potential lost far from the place, and with another attitude, within ...
-FINE_LENGTH, FINE_TURN = 0.5, 0.3  # ... these errors: friction stops what is pushed too little [m], [rad]
+TURN_VALUE = 1.0  # potential lost per radian of the whole rotation to the wanted attitude [1/rad]
+FINE_VALUE = 0.5  # potential lost, for place and for attitude each, far beyond errors ...
+# ... of this size; they reward small corrections, since friction stops weak pushes [m], [rad]
+FINE_LENGTH, FINE_TURN = 0.5, 0.3
 CALM_VALUE = 0.1  # potential lost per m/s and rad/s in the wanted pose ...
-CALM_RANGE = 1.0  # ... and 1/e of that at this sum of distance, tilt and turn [m], [rad]
+CALM_RANGE = 1.0  # ... and 1/e of that loss at this sum of distance, tilt and rotation [m], [rad]
 HOLD_VALUE = 1.0  # potential of a completed hold
 STEP_COST = 0.01
 SUCCESS_BONUS = 5.0
@@ -38,17 +39,17 @@ FINE_NAMES = tuple(f"tanh of (turn that is left, {axis}) / {FINE_TURN} rad" for 
 
 
 def goal_offset(worlds):
-    """Place minus centre, x and z, (n, 2) [m]."""
+    """Vector (n, 2) from the block's centre to the goal, x and z [m]."""
     return worlds.drawn["goal"] - worlds.pos[:, 0, ::2]
 
 
 def half_edges(worlds):
-    """Half edges along the axes in the order of the target face, (n, 3) [m]."""
+    """Half edges (n, 3) along the body axes in the order of `faces.order_of` [m]."""
     return 0.5 * np.take_along_axis(worlds.drawn["size"], order_of(worlds.drawn["target_face"]), axis=1)
 
 
 def turn_left(worlds):
-    """Quaternion (n, 4) of the turn from the block's attitude to the wanted one, world frame, at most half a turn."""
+    """Quaternion (n, 4) of the rotation from the present to the wanted attitude, world frame, at most half a turn."""
     drawn, count = worlds.drawn, len(worlds)
     pos, goal = np.empty((count, 1, 3)), np.empty((count, 1, 4))
     start_poses(drawn["goal"], drawn["heading"], drawn["target_face"], 0.5 * drawn["size"], pos, goal)
@@ -61,14 +62,14 @@ def turn_left(worlds):
 
 
 def rotation_vector(worlds):
-    """Axis times angle of `turn_left`, (n, 3) [rad]."""
+    """Rotation vectors (n, 3), axis times angle, of `turn_left` [rad]."""
     turn = turn_left(worlds)
     sine = np.linalg.norm(turn[:, 1:], axis=1, keepdims=True)
     return 2.0 * np.arctan2(sine, turn[:, :1]) * turn[:, 1:] / np.maximum(sine, 1e-12)
 
 
 def potential(worlds):
-    """Value of a state, whose gain is rewarded, (n,)."""
+    """Potential (n,) of the states, whose gain is rewarded."""
     measured = worlds.measured
     far = measured["distance"] + measured["tilt"] + measured["turn"]
     calm = CALM_VALUE * (measured["speed"] + measured["spin"]) * np.exp(-far / CALM_RANGE)
@@ -134,15 +135,15 @@ class BlockPose(BlockTask):
         super().__init__(worlds, frame_skip=frame_skip, **settings)
 
     def goal(self):
-        """Places on the floor."""
+        """Distribution of the goal's place on the floor."""
         return OnFloor(self.area)
 
     def declared_draws(self):
-        """Those of the block's tasks, and heading and face of the goal."""
+        """Distributions of the block's tasks, and those of the goal's heading and face."""
         return {**super().declared_draws(), "heading": YAW, "target_face": OtherFace()}
 
     def measure(self, worlds):
-        """Errors of place, face, heading and of the whole attitude, and speeds."""
+        """Errors of place, face, heading and attitude, and the block's speed and spin."""
         turn = turn_left(worlds)
         return {
             "distance": np.linalg.norm(goal_offset(worlds), axis=1),
@@ -154,22 +155,22 @@ class BlockPose(BlockTask):
         }
 
     def begin(self, worlds):
-        """Value of the start."""
+        """Store the potential of the start."""
         worlds.memory["potential"][:] = potential(worlds)
 
     def update(self, worlds):
-        """Count the steps in which everything is met."""
+        """Count the consecutive steps in which all conditions of success hold."""
         measured, held = worlds.measured, worlds.memory["held"]
         is_met = (measured["distance"] <= NEAR) & (measured["tilt"] <= FLAT) & (measured["heading_error"] <= AHEAD)
         is_met &= (measured["speed"] <= REST_SPEED) & (measured["spin"] <= REST_SPIN)
         held[:] = np.where(is_met, held + 1, 0)
 
     def success(self, worlds):
-        """In the pose and at rest for half a second."""
+        """Success: the block has held the pose at rest for half a second."""
         return worlds.memory["held"] >= HOLD_STEPS
 
     def rewards(self, worlds):
-        """Gain of the potential, time, bonus."""
+        """Gain of the potential, cost of time, and bonus for success."""
         value, before = potential(worlds), worlds.memory["potential"]
         terms = {
             "progress": value - before,
@@ -180,7 +181,7 @@ class BlockPose(BlockTask):
         return terms
 
     def goal_mark(self, world):
-        """A disc at the place, and the target face."""
+        """Disc at the goal's place, and the target face."""
         x, z = self.drawn["goal"][world]
         return {
             "pos": (x, 0.0, z),
@@ -198,7 +199,7 @@ HEADING_GAIN, LEVEL_GAIN, SPIN_GAIN = 4.0, 2.0, 0.5  # the same per radian about
 DRIFT_GAIN, PUSH_GAIN = 0.3, 0.6  # share of the force limit per m/s of drift, and of error of the speed
 LIFT = 0.75  # share of the force limit that takes weight off the floor while the block slides
 ACCELERATION, TOP_SPEED, APPROACH = 3.0, 6.0, 3.0  # [m/s²], [m/s], speed over distance close to the goal [1/s]
-ARRIVED, AIMED = 0.2, 0.05  # distance [m] and heading [rad] within which the block is let down
+ARRIVED, AIMED = 0.2, 0.05  # distance [m] and heading [rad] within which the block is no longer lifted
 UP = np.array((0.0, 1.0, 0.0))
 
 
@@ -218,7 +219,7 @@ def controller(observations: np.ndarray) -> np.ndarray:
     velocity, spin = SPEED * seen[:, 23:26:2], SPIN * seen[:, 26:29]
     axis = np.cross(axes[:, 0], -UP)
     sine = np.linalg.norm(axis, axis=1, keepdims=True)
-    axis = np.where(sine < 1e-3, axes[:, 1], axis / np.maximum(sine, 1e-3))  # about any axis, where it lies upside down
+    axis = np.where(sine < 1e-3, axes[:, 1], axis / np.maximum(sine, 1e-3))  # any axis, if the face points up
     tilt = np.arctan2(sine, -axes[:, 0, 1:2])
     tumble = np.concatenate([_over(-DRIFT_GAIN * velocity, 1.0), TURN_GAIN * tilt * axis - TURN_DAMPING * spin], axis=1)
     level = LEVEL_GAIN * sine * axis - SPIN_GAIN * spin
@@ -229,7 +230,7 @@ def controller(observations: np.ndarray) -> np.ndarray:
 
 
 def _slide(offset, velocity):
-    """Share of the force (n, 3) that brings the centre over its place no faster than one can brake."""
+    """Share (n, 3) of the force limit that moves the block to its goal, at a speed from which it can still brake."""
     distance = np.linalg.norm(offset, axis=1, keepdims=True)
     speed = np.minimum(np.sqrt(2.0 * ACCELERATION * distance), np.minimum(APPROACH * distance, TOP_SPEED))
     push = PUSH_GAIN * (speed * offset / np.maximum(distance, ARRIVED) - velocity)
@@ -238,5 +239,5 @@ def _slide(offset, velocity):
 
 
 def _over(push, lift):
-    """Push (n, 2) along x and z, with a lift."""
+    """Vectors (n, 3) from the horizontal push (n, 2) along x and z, and the lift along y."""
     return np.stack([push[:, 0], np.full(len(push), lift), push[:, 1]], axis=1)

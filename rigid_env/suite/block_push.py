@@ -10,20 +10,20 @@ from rigid_env.tasks import Entry, Task, Wrench
 G = 9.81  # [m/s²]
 PUSHER, CRATE = 0, 1  # bodies
 PUSHER_SIZE, PUSHER_MASS = (0.5, 0.5, 1.0), 20.0  # its wide faces look along its x axis [m], [kg]
-EDGE = 1.0  # of the crate [m]
+EDGE = 1.0  # edge of the crate [m]
 FORCE, TORQUE = 0.9, 0.8  # longest force over the weight, longest torque over weight times half the longest edge
 TOUCHING = 0.5 * (EDGE + PUSHER_SIZE[0])  # distance of the centres when faces touch [m]
 
 # --- success ----------------------------------------------------------------------------------------------
 NEAR, AHEAD = 0.15, 0.1  # errors of place [m] and heading [rad]
 REST = 0.05  # speed [m/s] and spin [rad/s] of the crate
-HOLD_STEPS = 10  # control steps in a row
-LOST = 6.0  # distance at which the crate is given up [m]
-TIPPED = 0.8  # cosine of the crate's tilt below which it is given up
+HOLD_STEPS = 10  # consecutive control steps
+LOST = 6.0  # distance from the goal beyond which the episode fails [m]
+TIPPED = 0.8  # cosine of the crate's tilt below which the episode fails
 
 # --- rewards ----------------------------------------------------------------------------------------------
 PLACE_VALUE, HEADING_VALUE = 0.5, 0.5  # potential lost per metre and per radian
-FINE_VALUE, FINE_LENGTH, FINE_TURN = 0.4, 0.3, 0.2  # potential lost beyond these errors [m], [rad]
+FINE_VALUE, FINE_LENGTH, FINE_TURN = 0.4, 0.3, 0.2  # potential lost beyond these small errors [m], [rad]
 REACH_VALUE = 0.2  # potential lost per metre between pusher and crate
 HOLD_VALUE, STEP_COST, SUCCESS_BONUS = 1.0, 0.01, 5.0
 
@@ -32,7 +32,7 @@ LENGTH, SPEED, SPIN, MASS = 2.0, 1.0, 2.0, 10.0  # [m], [m/s], [rad/s], [kg]
 
 
 def place_of(vectors):
-    """Horizontal part of vectors (n, 3) as complex numbers (n,): seen from above, x to the right and -z ahead."""
+    """Horizontal parts of vectors (n, 3) as complex numbers (n,): real axis along x, imaginary axis along -z."""
     return vectors[:, 0] - 1j * vectors[:, 2]
 
 
@@ -43,29 +43,29 @@ def heading_of(worlds, body):
 
 
 def seen(worlds, vectors):
-    """Horizontal vectors (n,) complex in the pusher's frame: ahead and to the left, (n, 2)."""
+    """Components (n, 2) of horizontal vectors (n,) complex in the pusher's frame: ahead and to the left."""
     turned = vectors * heading_of(worlds, PUSHER).conj()
     return np.stack([turned.real, turned.imag], axis=1)
 
 
 def way_left(worlds):
-    """Goal, which is the origin, minus the crate's centre, (n,) complex [m]."""
+    """Vector (n,) complex from the crate's centre to the goal, which is the origin [m]."""
     return -place_of(worlds.pos[:, CRATE])
 
 
 def turn_left(worlds):
-    """Turn to the goal's heading, which is zero, (n,) in (-pi, pi] [rad]."""
+    """Rotation (n,) of the crate to the goal's heading, which is 0, in (-pi, pi] [rad]."""
     return np.angle(heading_of(worlds, CRATE).conj())
 
 
 def side_angle(worlds):
-    """Cosine and sine of four times the angle between crate and pusher: alike for all four sides, (n, 2)."""
+    """Cosine and sine (n, 2) of four times the angle between crate and pusher, the same for all sides of the crate."""
     turn = (heading_of(worlds, CRATE) * heading_of(worlds, PUSHER).conj()) ** 4
     return np.stack([turn.real, turn.imag], axis=1)
 
 
 def potential(worlds):
-    """Value of a state, whose gain is rewarded, (n,)."""
+    """Potential (n,) of the states, whose gain is rewarded."""
     distance, turn = worlds.measured["distance"], worlds.measured["heading_error"]
     apart = np.abs(place_of(worlds.pos[:, CRATE]) - place_of(worlds.pos[:, PUSHER])) - TOUCHING
     error = PLACE_VALUE * distance + HEADING_VALUE * turn + REACH_VALUE * np.maximum(apart, 0.0)
@@ -140,12 +140,12 @@ class BlockPush(Task):
     draws = {
         "mass[1]": (4.0, 10.0),
         "friction": (0.3, 0.5),
-        "away": (0.5, 2.5),  # crate from goal [m]
-        "bearing": (-np.pi, np.pi),  # of the way from the crate to the goal [rad]
-        "heading": (-0.8, 0.8),  # of the crate at the start [rad]
-        "apart": (1.3, 2.0),  # pusher from crate [m]
-        "astray": (-0.5, 0.5),  # pusher's bearing from the place behind the crate, seen from the crate [rad]
-        "yaw": (-0.5, 0.5),  # of the pusher, from facing the crate [rad]
+        "away": (0.5, 2.5),  # distance from the goal to the crate [m]
+        "bearing": (-np.pi, np.pi),  # direction from the crate to the goal [rad]
+        "heading": (-0.8, 0.8),  # heading of the crate at the start [rad]
+        "apart": (1.3, 2.0),  # distance from the crate to the pusher [m]
+        "astray": (-0.5, 0.5),  # angle of the pusher off the line from goal to crate, at the crate [rad]
+        "yaw": (-0.5, 0.5),  # angle of the pusher's heading off the direction to the crate [rad]
     }
     memory = {"held": 1, "potential": 1}
     max_episode_steps = 300
@@ -154,7 +154,7 @@ class BlockPush(Task):
         super().__init__(worlds, frame_skip=frame_skip, dt=dt, **settings)
 
     def place(self, drawn):
-        """Crate on a ring about the goal, pusher behind it."""
+        """Place the crate at the drawn distance from the goal, and the pusher behind it."""
         count = len(drawn["away"])
         crate = -drawn["away"] * np.exp(1j * drawn["bearing"])
         ahead = drawn["bearing"] + drawn["astray"]
@@ -168,7 +168,7 @@ class BlockPush(Task):
         return {"pos": pos, "quat": quat}
 
     def measure(self, worlds):
-        """Errors of place and heading, and speeds of the crate."""
+        """Errors of the crate's place and heading, and its speed and spin."""
         return {
             "distance": np.abs(way_left(worlds)),
             "heading_error": np.abs(turn_left(worlds)),
@@ -177,26 +177,26 @@ class BlockPush(Task):
         }
 
     def begin(self, worlds):
-        """Value of the start."""
+        """Store the potential of the start."""
         worlds.memory["potential"][:] = potential(worlds)
 
     def update(self, worlds):
-        """Count the steps in which everything is met."""
+        """Count the consecutive steps in which all conditions of success hold."""
         measured, held = worlds.measured, worlds.memory["held"]
         is_met = (measured["distance"] <= NEAR) & (measured["heading_error"] <= AHEAD)
         is_met &= (measured["speed"] <= REST) & (measured["spin"] <= REST)
         held[:] = np.where(is_met, held + 1, 0)
 
     def success(self, worlds):
-        """In the pose and at rest for half a second."""
+        """Success: the crate has held the pose at rest for half a second."""
         return worlds.memory["held"] >= HOLD_STEPS
 
     def failure(self, worlds):
-        """Crate tipped or far away."""
+        """Failure: the crate has tipped or is far away."""
         return (worlds.rotation[:, CRATE, 1, 1] < TIPPED) | (worlds.measured["distance"] > LOST)
 
     def rewards(self, worlds):
-        """Gain of the potential, time, bonus."""
+        """Gain of the potential, cost of time, and bonus for success."""
         value, before = potential(worlds), worlds.memory["potential"]
         terms = {
             "progress": value - before,
@@ -207,26 +207,31 @@ class BlockPush(Task):
         return terms
 
     def goal_mark(self, world):
-        """A disc at the place."""
+        """Disc at the goal."""
         return {"pos": (0.0, 0.0, 0.0), "radius": 0.5, "reached": bool(self.memory_arrays["held"][world] > 0)}
 
 
 # --- controller -------------------------------------------------------------------------------------------
 FACES = np.exp(0.5j * np.pi * np.arange(4))  # directions in which the four sides are pushed, crate's frame
-NEAREST, KEEP = 0.15, 0.5  # distance below which its direction counts less [m], worth of staying at a side
-TURNED, ARRIVED, AIMED = 0.05, 0.1, 0.07  # heading that is no longer corrected [rad], errors that end the work
-RING, ROUND = 1.45, 0.9  # radius of the way around the crate [m], bearing beyond which it is taken [rad]
-STANDOFF, LINED, LEVELLED = 0.2, 0.12, 0.15  # gap in which one lines up [m], errors of that [m], [rad]
-ASIDE, ASIDE_GAIN = 0.5, 2.5  # longest offset of a push that turns [m], offset over turn [m/rad]
-LEAD, LEAD_GAIN = 0.35, 0.5  # largest turn of the pusher beyond the crate's side [rad], over the turn that is left
-PUSH_LENGTH, PUSH_SPEED, BRAKING = 0.3, 0.8, 2.0  # of a push that turns [m], [m/s], deceleration [m/s²]
+# distance to the goal below which its direction counts less [m], preference for the present side
+NEAREST, KEEP = 0.15, 0.5
+# error of the heading that is not corrected [rad], errors at which the controller stops [m], [rad]
+TURNED, ARRIVED, AIMED = 0.05, 0.1, 0.07
+RING, ROUND = 1.45, 0.9  # radius of the path around the crate [m], bearing beyond which the pusher takes it [rad]
+# gap in which the pusher lines up [m], largest errors of place [m] and heading [rad] before it pushes
+STANDOFF, LINED, LEVELLED = 0.2, 0.12, 0.15
+ASIDE, ASIDE_GAIN = 0.5, 2.5  # largest offset of a push that rotates the crate [m], offset per rotation [m/rad]
+# largest rotation of the pusher beyond the crate's side [rad], and its ratio to the crate's remaining rotation
+LEAD, LEAD_GAIN = 0.35, 0.5
+# distance [m] and speed [m/s] of a push that rotates the crate, deceleration [m/s²]
+PUSH_LENGTH, PUSH_SPEED, BRAKING = 0.3, 0.8, 2.0
 FORCE_GAIN, TORQUE_GAIN, SPIN_ARM = 0.4, 0.15, 0.3  # [m g s/m], [m g s], mean arm of the floor's friction [m]
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Go to the side from which the crate has to be pushed, line up, and push; beside its centre to turn it.
+    """Move to the side of the crate that must be pushed, line up, and push, off the centre to rotate the crate.
 
-    Friction that floor and crate oppose to the motion is known, and is added to the force.
+    The known friction forces of floor and crate are added to the force of the action.
 
     Parameters
     ----------
@@ -255,12 +260,12 @@ def controller(observations: np.ndarray) -> np.ndarray:
 
 
 def _plane(numbers, k):
-    """Entries k and k + 1 as complex numbers (n,)."""
+    """Observed numbers k and k + 1 as complex numbers (n,)."""
     return numbers[:, k] + 1j * numbers[:, k + 1]
 
 
 def _side(crate, way, angle):
-    """Direction in which the best side is pushed, (n,) complex, and the way that is left along it, (n,) [m]."""
+    """Direction (n,) complex in which the best side is pushed, and the distance (n,) still to go along it [m]."""
     sides = np.exp(1j * angle)[:, None] * FACES
     left, behind = ((vector[:, None] * sides.conj()).real for vector in (way, crate / np.abs(crate)))
     worth = left / np.maximum(np.abs(way), NEAREST)[:, None] + KEEP * behind
@@ -269,14 +274,14 @@ def _side(crate, way, angle):
 
 
 def _motion(place, left, turn, turn_error):
-    """Velocity of the pusher (n,) complex [m/s], and flags (n,): it pushes, it touches the right side.
+    """Velocity (n,) complex of the pusher [m/s], and flags (n,): it may push, and it touches the right side.
 
     Parameters
     ----------
     place : (n,) complex
-        Of the pusher, as seen from the crate, with the direction of the push as real axis [m].
+        Pusher relative to the crate; the real axis is the direction of the push [m].
     left, turn, turn_error : (n,) float
-        Way to push [m], the crate's turn that is left, and the pusher's to the side [rad].
+        Distance still to push [m], remaining rotation of the crate, and the pusher's rotation to face the side [rad].
     """
     is_turning = np.abs(turn) > TURNED
     aside = np.where(is_turning, -np.clip(ASIDE_GAIN * turn, -ASIDE, ASIDE), 0.0) - place.imag

@@ -9,31 +9,31 @@ from rigid_env.tasks import Entry, LogUniform, Task, Wrench, observe
 
 G = 9.81  # [m/s²]
 A, B = 0, 1  # bodies
-EDGE = 1.0  # of cube A [m]
+EDGE = 1.0  # edge of cube A [m]
 BASE = (1.2, 0.8, 1.2)  # edges of block B [m]
-MASS = 20.0  # of cube A [kg]
-LARGEST_RATIO = 1000.0  # of the masses, A over B
+MASS = 20.0  # mass of cube A [kg]
+LARGEST_RATIO = 1000.0  # largest ratio of the masses, A to B
 LOG_LARGEST = np.log(LARGEST_RATIO)
 STRENGTH = 1.5  # longest force over the weight of A
 TORQUE = 0.2  # longest torque over the weight of A times half its edge
 STACKED = 0.5 * (EDGE + BASE[1])  # height of A's centre over B's when it lies on B [m]
-CARRIED = 0.5  # least contact force on A over its weight while B carries it
+CARRIED = 0.5  # least contact force on A, as a share of its weight, while B carries it
 STILL = 0.02  # speed [m/s] and spin [rad/s] below which A is at rest
-CREEP = 1e-3  # farthest that A may move during the time of rest [m]
-UNMOVED = 0.05  # farthest that B may move [m] and turn [rad] during the episode
-HOLD_TIME = 2.0  # of rest that is a success [s]
-CLEARANCE = 0.3  # height over B's top at which A should come near [m]
+CREEP = 1e-3  # largest displacement of A during the time of rest [m]
+UNMOVED = 0.05  # largest displacement [m] and rotation [rad] of B during the episode
+HOLD_TIME = 2.0  # time of rest that is a success [s]
+CLEARANCE = 0.3  # height over B's upper face at which A should approach [m]
 LENGTH, SPEED, SPIN = 2.0, 2.0, 2.0  # units of the observation [m], [m/s], [rad/s]
 HELD_WORTH, SUCCESS_WORTH = 3.0, 5.0
 
 
 def stack_offset(worlds):
-    """Centre of A minus its place on B, (n, 3) [m]."""
+    """Vector (n, 3) from A's place on B to A's centre [m]."""
     return worlds.pos[:, A] - worlds.pos[:, B] - np.array([0.0, STACKED, 0.0])
 
 
 def route(offset):
-    """Length of a way (n,) to the place on B, over its edge: along, and up or down to a funnel above B [m]."""
+    """Length (n,) of a path over B's edge to the place on B: horizontal, plus up or down to a funnel above B [m]."""
     along = np.hypot(offset[:, 0], offset[:, 2])
     return along + np.abs(offset[:, 1] - CLEARANCE * np.minimum(along, 1.0))
 
@@ -89,9 +89,9 @@ class BlockStack(Task):
         Entry("logarithm of the mass ratio", "1", 0, 1, lambda w: np.log(MASS / w.drawn["mass[1]"]) / LOG_LARGEST),
     ]
     draws = {
-        "apart": (1.8, 3.0),  # the centres [m]
-        "bearing": (-np.pi, np.pi),  # of A, as seen from B [rad]
-        "yaw": (-np.pi / 4, np.pi / 4),  # of A [rad]
+        "apart": (1.8, 3.0),  # distance of the centres [m]
+        "bearing": (-np.pi, np.pi),  # direction from B to A [rad]
+        "yaw": (-np.pi / 4, np.pi / 4),  # yaw of A [rad]
         "mass[1]": LogUniform(MASS / LARGEST_RATIO, MASS),
     }
     memory = {"held": 1, "longest": 1, "place": 3, "to_go": 1}
@@ -101,7 +101,7 @@ class BlockStack(Task):
         super().__init__(worlds, frame_skip=frame_skip, dt=dt, **settings)
 
     def place(self, drawn):
-        """A stands on the floor on a ring about B."""
+        """Place A on the floor, on a ring about B."""
         count = len(drawn["apart"])
         pos = np.zeros((count, 2, 3))
         pos[:, A, 0] = drawn["apart"] * np.cos(drawn["bearing"])
@@ -113,7 +113,7 @@ class BlockStack(Task):
         return {"pos": pos, "quat": quat}
 
     def measure(self, worlds):
-        """Distance of A from its place, displacement of B, and time of rest, with that of this step."""
+        """Distance of A from its place, displacement of B, and time of rest including this step."""
         return {
             "distance": np.linalg.norm(stack_offset(worlds), axis=1),
             "moved": np.linalg.norm(worlds.pos[:, B] - np.array([0.0, 0.5 * BASE[1], 0.0]), axis=1),
@@ -121,28 +121,28 @@ class BlockStack(Task):
         }
 
     def begin(self, worlds):
-        """Note where A is, and how far it has to go."""
+        """Store A's position, and the length of its path to B."""
         worlds.memory["place"][:] = worlds.pos[:, A]
         worlds.memory["to_go"][:] = self._to_go(worlds)
 
     def update(self, worlds):
-        """Note the time of rest, and where it began."""
+        """Store the time of rest, and A's position at its start."""
         held = worlds.measured["held"]
         has_ended = held == 0.0
         worlds.memory["held"][:] = held
         worlds.memory["place"][has_ended] = worlds.pos[has_ended, A]
 
     def success(self, worlds):
-        """At rest for long enough; half a control step is left to rounding."""
+        """Success: A has rested for `HOLD_TIME`; half a control step is allowed for rounding."""
         return worlds.measured["held"] > HOLD_TIME - 0.5 * self.control_dt
 
     def failure(self, worlds):
-        """B has been moved or turned."""
+        """Failure: B has been moved or rotated."""
         turned = 2.0 * np.arccos(np.minimum(np.abs(worlds.quat[:, B, 0]), 1.0))
         return (worlds.measured["moved"] > UNMOVED) | (turned > UNMOVED)
 
     def rewards(self, worlds):
-        """Gains of way and rest, and the values of the two ends."""
+        """Decrease of the path, gain of the longest time of rest, and bonus for success."""
         before, now = worlds.memory["to_go"], self._to_go(worlds)
         longest, held = worlds.memory["longest"], worlds.measured["held"]
         progress, gain = before - now, np.maximum(held - longest, 0.0)
@@ -154,7 +154,7 @@ class BlockStack(Task):
         }
 
     def _goes_on(self, worlds):
-        """(n,) bool: B carries A, which is still, and where its rest began."""
+        """Flags (n,) bool: B carries A, and A is still and near the position at which its rest began."""
         is_still = np.maximum(_lengths(worlds.linvel[:, A]), _lengths(worlds.angvel[:, A])) < STILL
         is_above = worlds.pos[:, A, 1] > worlds.pos[:, B, 1] + STACKED - UNMOVED
         is_carried = worlds.contact_force[:, A, 1] > CARRIED * worlds.weight[:, A]
@@ -162,11 +162,11 @@ class BlockStack(Task):
         return is_still & is_above & is_carried & is_there
 
     def _to_go(self, worlds):
-        """Way to the place on B, and tilt (n,) [m]."""
+        """Length (n,) of A's path to its place on B [m], plus one minus the cosine of A's tilt."""
         return route(stack_offset(worlds)) + (1.0 - worlds.rotation[:, A, 1, 1])
 
     def goal_mark(self, world):
-        """B itself."""
+        """Disc below B."""
         return {"pos": (0.0, 0.0, 0.0), "radius": 1.0, "reached": bool(self.memory_arrays["held"][world] > 0.0)}
 
 
@@ -176,7 +176,7 @@ def _lengths(vectors):
 
 
 def controller(observations: np.ndarray) -> np.ndarray:
-    """Lift A, carry it over B, lower it, and let go as soon as B carries some of it.
+    """Lift A, carry it over B, lower it, and let go as soon as B carries part of its weight.
 
     Parameters
     ----------

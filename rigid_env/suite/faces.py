@@ -1,4 +1,4 @@
-"""Axes of a block in the order of a target face, so that a policy need not know which of the six it is."""
+"""Axes of a block in an order that starts at a target face, so that a policy need not know which face it is."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ HALF_EDGES = tuple(f"half edge along {which}" for which in ("normal", "next", "l
 
 
 def order_of(faces: np.ndarray) -> np.ndarray:
-    """Body axes (n, 3) int64 for faces (n,), 0 to 5 for -x, +x, -y, +y, -z, +z: the face's own, and the next two."""
+    """Body axes (n, 3) int64 in the order that starts with the axis of a face.
+
+    `faces` (n,) are 0 to 5 for -x, +x, -y, +y, -z, +z.
+    """
     return (faces.astype(np.int64)[:, None] // 2 + np.arange(3)) % 3
 
 
@@ -41,5 +44,5 @@ def target_axes(rotation: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def axes_of(worlds):
-    """`target_axes` (n, 9) of body 0, whose target face is drawn as ``target_face``, for an observation."""
+    """Result of `target_axes` (n, 9) for body 0 and its drawn ``target_face``, for an observation."""
     return target_axes(worlds.rotation[:, 0], worlds.drawn["target_face"]).reshape(-1, 9)
