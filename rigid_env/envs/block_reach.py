@@ -37,9 +37,8 @@ class BlockReachEnv(BlockEnv):
 
     ## Observation Space
 
-    `Box` of 24 float32, world frame. Each number is told in its unit and clipped to its bounds. R is the
-    rotation matrix from body to world, by rows. Walls: the floor, then left and right (`three`), or x = 0
-    and z = 0 (`corner`).
+    `Box` of 24 float32, world frame. Each number is given in its unit and clipped to its bounds. R is the rotation
+    matrix from body to world, by rows. Walls: the floor, then left and right (`three`), or x = 0 and z = 0 (`corner`).
 
     | Num | Observation | Min | Max | Unit |
     | --- | --- | --- | --- | --- |
@@ -80,10 +79,10 @@ class BlockReachEnv(BlockEnv):
     At rest on the floor on a random face, with a random yaw, at a random place clear of the walls; the
     goal is another such place. All are drawn uniformly from the square `|x|, |z| <= half_width`
     (`corner`: `0 <= x, z <= 2 half_width`), less 0.25 m and half the block's diagonal on each side.
-    `reset(options=...)` fixes what it names, for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the
-    face that is down, 0 to 5 for -x, +x, -y, +y, -z, +z) and `goal` (x, z) [m]. Both places are inside the square.
-    The parameters `mass`, `size`, `friction`, `restitution` and `gravity` can be fixed as well, randomised or not.
-    The other draws of a seed stay the same.
+    `reset(options=...)` fixes the draws that it names, for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the
+    face that is down, 0 to 5 for -x, +x, -y, +y, -z, +z) and `goal` (x, z) [m]. Both places are inside the square. The
+    parameters `mass`, `size`, `friction`, `restitution` and `gravity` can be fixed as well, randomised or not. The
+    other draws of a seed stay the same.
 
     ## Episode End
 
@@ -96,7 +95,7 @@ class BlockReachEnv(BlockEnv):
     of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
     `reward_success` the bonus. So are the draws of the episode: `place` [m], `yaw` [rad],
     `face`, `goal` [m], and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
-    without those that `effects` take the place of.
+    except parameters that `effects` fix.
 
     ## Arguments
 
@@ -127,8 +126,8 @@ class BlockReachEnv(BlockEnv):
     | `arrows` | True | whether pictures show contacts, forces and torques |
 
     `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) as well: each episode
-    then draws its own value. What is drawn is not observed, the edges in the gaps to the walls apart. They are
-    attributes of the environment, too: a value set there holds in all later episodes.
+    then draws its own value. Drawn parameters are not observed; only the edges show, in the gaps to the walls. The
+    parameters are also attributes of the environment: a value set there holds in all later episodes.
 
     ## Version History
 

@@ -13,9 +13,9 @@ class BlockReorientEnv(BlockEnv):
 
     ## Description
 
-    The block of `BlockReachEnv`, in the same box; now one of its faces is to be turned down, wherever
-    that is on the floor. The torque alone tips the block over its shortest half edge
-    only: the others take the force's help, momentum, or a wall.
+    The block and the box are those of `BlockReachEnv`. One of the block's faces is to be turned down, at any place on
+    the floor. The torque alone tips the block over its shortest half edge only. Tipping it over the other half edges
+    takes the force's help, momentum, or a wall.
 
     ## Action Space
 
@@ -35,9 +35,9 @@ class BlockReorientEnv(BlockEnv):
 
     ## Observation Space
 
-    `Box` of 23 float32, world frame. Each number is told in its unit and clipped to its bounds. The body
-    axes are told as seen from the target. The outward normal of the target face comes first, then the next
-    two body axes in cyclic order (x, y, z, x, ...). The half edges along the three follow.
+    `Box` of 23 float32, world frame. Each number is given in its unit and clipped to its bounds. The body axes are
+    ordered from the target face. The outward normal of the target face comes first, then the next two body axes in
+    cyclic order (x, y, z, x, ...). The half edges along the three follow.
 
     | Num | Observation | Min | Max | Unit |
     | --- | --- | --- | --- | --- |
@@ -88,7 +88,7 @@ class BlockReorientEnv(BlockEnv):
     of the reward are in it, too: `reward_progress` is the gain of the potential, `reward_effort` the costs,
     `reward_success` the bonus. So are the draws of the episode: `place` [m], `yaw` [rad],
     `face`, `target_face`, and the parameters `mass` [kg], `size` [m], `friction`, `restitution` and `gravity` [m/s²],
-    without those that `effects` take the place of.
+    except parameters that `effects` fix.
 
     ## Arguments
 

@@ -1,4 +1,4 @@
-"""Handwritten controllers: where each stands, and those of the block's two tasks.
+"""Handwritten controllers of the block's tasks, and the import paths of all controllers.
 
 A controller is a function from observations (n, entries) to actions (n, 6). It gets the same observations as an agent,
 and knows only the block's observation table (see `rigid_env.envs.block_reach`).
@@ -135,7 +135,7 @@ CONTROLLERS = {
     "rigid_env/BlockPush-v0": "rigid_env.suite.block_push:controller",
     "rigid_env/BlockBalance-v0": "rigid_env.suite.block_balance:controller",
 }
-"""Places of the controllers, ``module:function``, by the id of their environment."""
+"""Import paths of the controllers, ``module:function``, by the id of their environment."""
 
 
 def load_controller(env_id: str) -> Policy:

@@ -27,7 +27,7 @@ from rigid_env.tasks.restoring import capture, reinstate
 from rigid_env.tasks.state import TaskState
 from rigid_env.tasks.task import shaped
 
-RENDER_FPS = 40  # of the default control period, 5 steps of 5 ms
+RENDER_FPS = 40  # pictures per second: one for each control step of the default length, 5 physics steps of 5 ms
 
 
 @dataclass(frozen=True)

@@ -14,33 +14,33 @@ from rigid_env.tasks import Task
 from rigid_env.tasks.layout import INFO, SUCCESS
 
 ROWS = 256
-"""Copies of an array that are made at once."""
+"""Number of copies of an array that are made at once."""
 
 
 class InfoMaker:
     """Maker of the info dict of a step or a start, from the row of an outcome and the status; see `info_maker`.
 
     The drawn values stay the same from step to step: an info is a copy of a dict that holds them, and the other numbers
-    are written into it. Arrays are new in each info, as Gymnasium wants them: rows of tables with many copies, which
-    take half the time of copies one by one.
+    are written into it. Gymnasium requires new arrays in each info. They are rows of tables with many copies, which
+    take half the time of single copies.
 
     Parameters
     ----------
     task : Task
-        Of one world.
+        Task of one world.
     """
 
     def __init__(self, task: Task):
         self.task, self.episodes = task, task.episodes
-        self.changes = -1  # nothing is told yet
+        self.changes = -1  # no drawn values have been copied yet
         self.pattern: dict[str, Any] = {}
 
     def __call__(self, row: list[float], status: int) -> dict[str, Any]:
-        """Info of an outcome."""
+        """Info dict of a step or a start, from the row of its outcome and its status."""
         raise NotImplementedError
 
     def tell(self) -> None:
-        """Take over the drawn values."""
+        """Copy the drawn values of the running episode into the dict that infos are copied from."""
         self.changes = self.episodes.changes
         drawn = {name: self.task.drawn[name][0] for name in self.task.own_draws}
         keys = ("is_success", *self.task.info_names, "physics_status")
@@ -53,20 +53,20 @@ class InfoMaker:
 
 
 def plain_maker(task: Task) -> InfoMaker:
-    """Maker of infos without contacts."""
+    """Make the maker of infos without contacts."""
     return _compiled(task.info_names, arrays_of(task))(task)
 
 
 def arrays_of(task: Task) -> tuple[str, ...]:
-    """Names of draws of several numbers."""
+    """Names of the draws whose values are arrays of several numbers."""
     return tuple(name for name in task.own_draws if task.drawn[name].ndim > 1)
 
 
 @cache
 def _compiled(names: tuple[str, ...], arrays: tuple[str, ...]) -> type[InfoMaker]:
-    """Class of makers with a call compiled for these names, of numbers of an outcome and of drawn arrays.
+    """Class of makers whose call is compiled for these names: numbers of an outcome, and arrays of drawn values.
 
-    A loop over the names would take three times as long, a twentieth of a step of one environment.
+    A loop over the names would take three times as long. The difference is a twentieth of a step of one environment.
     """
     lines = [
         "if self.episodes.changes != self.changes:",
@@ -84,7 +84,7 @@ def _compiled(names: tuple[str, ...], arrays: tuple[str, ...]) -> type[InfoMaker
 
 
 def _copies(values: list[np.ndarray]) -> Iterator[Iterator[tuple[np.ndarray, ...]]]:
-    """Copies of arrays without end: blocks of tuples."""
+    """Yield blocks of tuples without end; each tuple has a new copy of every array."""
     row = np.concatenate(values)
     ends = np.cumsum([0, *map(len, values)]).tolist()
     while True:
@@ -110,6 +110,6 @@ class ContactInfoMaker:
 
 
 def info_maker(task: Task, contacts: int, impacts: int) -> InfoMaker | ContactInfoMaker:
-    """Maker of the infos of a task of one world; other arguments as of `contact_infos.contact_infos`."""
+    """Make the maker of infos for a task of one world; other arguments as of `contact_infos.contact_infos`."""
     plain, reader = plain_maker(task), contact_infos(task, contacts, impacts)
     return plain if reader is None else ContactInfoMaker(plain, reader)

@@ -1,4 +1,4 @@
-"""Tasks of several agents: each has its part of the action, its view and its reward.
+"""Tasks of several agents: each agent has its part of the action, its view of the observation and its reward.
 
 The methods are those of PettingZoo's parallel interface, for which `rigid_env.envs.pettingzoo` adds the base class.
 Nothing of PettingZoo is needed here.
@@ -29,18 +29,19 @@ Parts = dict[str, Any]
 """Values by agent."""
 
 OWN_TERM = re.compile(r".+\[(.+)\]")
-"""Name of a reward's term that counts for one agent alone, such as ``near[left]``."""
+"""Name of a reward term that counts for one agent alone, such as ``near[left]``."""
 
 DUMMY = "options"
-"""Option that PettingZoo's own tests pass to every environment; it means nothing."""
+"""Option that PettingZoo's own tests pass to every environment; it is ignored."""
 
 
 class Parallel:
     """A task of one world as an environment of several agents, who act at the same time.
 
-    Agents, and the numbers of an action that are theirs, are told by `agent` of the task's actions. An `observation`
-    that is a mapping tells which entries each agent sees; of a list everybody sees all. A term of the reward called
-    ``name[agent]`` counts for this agent alone, all others for everybody. An episode ends for all agents at once.
+    The attribute `agent` of the task's actions names each agent, and assigns the numbers of an action to the agents. If
+    the task's `observation` is a mapping, it lists the entries that each agent sees. If it is a list, every agent sees
+    all entries. A term of the reward called ``name[agent]`` counts for this agent alone, all others for everybody. An
+    episode ends for all agents at once.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class Parallel:
         All agents, and those of the running episode: all, or none before the first reset and after the end.
     action_spaces, observation_spaces : dict of str to Space
     state_space : Box
-        Of `state`.
+        Space of `state`.
 
     Raises
     ------
@@ -99,7 +100,7 @@ class Parallel:
         Parameters
         ----------
         actions : dict of str to (numbers,) array_like
-            Of every agent; as of `RigidEnv.step`.
+            Action of every agent, as of `RigidEnv.step`.
 
         Returns
         -------
@@ -124,7 +125,7 @@ class Parallel:
         return *told, infos
 
     def _joined(self, actions: Mapping[str, ArrayLike]) -> np.ndarray:
-        """One action of all agents' numbers."""
+        """Join the agents' actions to one action of the task."""
         if not isinstance(actions, Mapping) or actions.keys() != self._places.keys():
             given = ", ".join(map(repr, actions)) if isinstance(actions, Mapping) else repr(actions)
             raise ValueError(f"actions is of {given}; allowed is a dict of {', '.join(map(repr, self._places))}")
@@ -164,7 +165,7 @@ class Parallel:
         return row.copy()
 
     def render(self) -> NDArray[np.uint8] | None:
-        """As of `RigidEnv.render`."""
+        """Draw the world, as `RigidEnv.render` does."""
         return self._env.render()
 
     def close(self) -> None:
@@ -174,7 +175,7 @@ class Parallel:
 
 
 def own_terms(task: Task) -> dict[str, list[str]] | None:
-    """Keys in `info` of the terms of each agent's reward; None where all have the whole reward.
+    """Keys in `info` of the reward terms that each agent gets; None if all agents get the whole reward.
 
     Raises
     ------
@@ -194,7 +195,7 @@ def own_terms(task: Task) -> dict[str, list[str]] | None:
 
 
 def _views(env: RigidEnv[Any]) -> Mapping[str, np.ndarray]:
-    """Numbers of the observation that each agent sees; none where all see all."""
+    """Indices of the observation's numbers that each agent sees; empty if all agents see the whole observation."""
     views = env.task.observed.views
     if views and env.observation_space.shape != (env.task.observed.size,):
         raise ValueError(
@@ -222,7 +223,7 @@ def single_env(
     Raises
     ------
     ValueError
-        An id of another package, and what the environment refuses.
+        An id of another package, or an argument that the environment refuses.
     """
     if not isinstance(task, str) or CLASS.fullmatch(task):
         env: Any = TaskEnv(task, **settings)

@@ -1,4 +1,4 @@
-"""Adapter of tasks of several agents for PettingZoo's parallel interface, the extra ``pettingzoo``."""
+"""Adapter that gives tasks of several agents PettingZoo's parallel interface; it needs the extra ``pettingzoo``."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ except ImportError:
 
 
 class TaskParallelEnv(Parallel, ParallelEnv):
-    """A `rigid_env.envs.parallel.Parallel` that is an environment of PettingZoo, too."""
+    """A `rigid_env.envs.parallel.Parallel` that also inherits from PettingZoo's base class."""
 
 
 def parallel_env(
     task: type[Task] | str, max_episode_steps: int | Literal["registered"] | None = "registered", **settings: Any
 ) -> TaskParallelEnv:
-    """Make a task an environment of several agents.
+    """Make an environment of several agents from a task.
 
     Parameters
     ----------
     task : class of Task, or str
-        The class, where it stands, ``module:Class``, or the id of an environment.
+        Class, its import path ``module:Class``, or the id of an environment.
     max_episode_steps : int or None
         Control steps after which an episode is truncated; None or -1: never. The default is that of the id or the task.
     settings
-        Of the task, such as ``accuracy``, and of its environment, such as ``render_mode``.
+        Arguments of the task, such as ``accuracy``, and of its environment, such as ``render_mode``.
 
     Raises
     ------

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 
 class PlainSpec:
-    """Part of an environment that keeps its spec as plain data, whatever objects it was made with."""
+    """Part of an environment that keeps its spec as plain data, even if it was made with objects."""
 
     _spec: EnvSpec | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Spec that `gymnasium.make` made it from; None without it."""
+        """Spec with which `gymnasium.make` made the environment; None if it was made without `gymnasium.make`."""
         return self._spec
 
     @spec.setter
@@ -63,12 +63,12 @@ def _plain(value: Any) -> Any:
 
 
 def _is_of_user(effect: Any) -> bool:
-    """True for a class that scene files do not know: the name of a class is not enough to find it."""
+    """True if scene files do not know an effect's class, so that its name is not enough to find it."""
     return type(effect) not in EFFECTS
 
 
 def import_path(task: type[Task]) -> str | None:
-    """Place of a class, ``module:Class``; None if another process would not find it there."""
+    """Import path of a class, ``module:Class``; None if another process could not import it."""
     module = sys.modules.get(task.__module__)
     is_there = task.__module__ != "__main__" and getattr(module, task.__qualname__, None) is task
     return f"{task.__module__}:{task.__qualname__}" if is_there else None

@@ -1,4 +1,4 @@
-"""Trained policies that come with the package, as plain arrays that NumPy alone runs: one for an environment."""
+"""Trained policies in the package, at most one for each environment, as plain arrays that need only NumPy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rigid_env.envs.registration import NAMESPACE
 FOLDER = Path(__file__).parents[1] / "suite" / "policies"
 
 PRETRAINED = "pretrained"
-"""Word that stands for the policy of an environment where a file of a policy may be named."""
+"""Word that selects the environment's own trained policy, in place of the path of a policy file."""
 
 ID = re.compile(rf"(?:[\w.]+:)?{NAMESPACE}/(\w+-v\d+)")
 
@@ -21,17 +21,17 @@ def pretrained_ids() -> list[str]:
 
 
 def is_id(text: str) -> bool:
-    """Return whether a text is the id of an environment of this package, such as ``rigid_env/BlockReach-v0``."""
+    """True if a text is the id of an environment of this package, such as ``rigid_env/BlockReach-v0``."""
     return ID.fullmatch(text) is not None
 
 
 def pretrained_path(env_id: str) -> Path:
-    """Return the file of the policy of an environment, by its id; a module to import before a colon may stand there.
+    """Path of the policy file of an environment, by its id, which may begin with a module and a colon.
 
     Raises
     ------
     ValueError
-        If it has none.
+        The environment has no trained policy.
     """
     found = ID.fullmatch(env_id)
     path = FOLDER / f"{found[1]}.npz" if found else FOLDER

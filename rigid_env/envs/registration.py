@@ -70,7 +70,7 @@ def register_envs() -> None:
 
 
 def _file_of(name: str) -> str:
-    """Return the name of the module of a task: BlockReach is in block_reach."""
+    """Name of the module of a task, such as block_reach for BlockReach."""
     return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
@@ -82,8 +82,8 @@ def register_task(id: str, task: type | str, **settings: Any) -> None:
     id : str
         Id such as ``mine/EdgeBalance-v0``.
     task : class of Task, or str
-        The class, or where it stands, ``module:Class``: workers that start afresh import it from there. The spec keeps
-        this place of a class that can be imported. One of ``__main__`` or of a function stays a class, and its spec
+        Class, or its import path ``module:Class``, from which new worker processes import it. The spec keeps the path
+        of a class that can be imported. A class of ``__main__`` or of a function is kept as an object, and its spec
         cannot become JSON.
     settings
         Arguments of the task, such as ``accuracy``, and of its environment, in place of their defaults. The spec keeps

@@ -61,8 +61,8 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     ## Observation Space
 
     `Box` of 18 float32 for each body of the scene, in their order, and 3 of the goal if there is one. World
-    frame. Each number is told in its unit and clipped to its bounds. R is the rotation matrix from body to
-    world, by rows. With one body and a goal:
+    frame. Each number is given in its unit and clipped to its bounds. R is the rotation matrix from body to world, by
+    rows. With one body and a goal:
 
     | Num | Observation | Min | Max | Unit |
     | --- | --- | --- | --- | --- |
@@ -99,10 +99,10 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     ## Starting State
 
-    Poses and velocities of the scene. `[environment.start]` has half widths, three numbers each, of what is
-    added to `pos` [m], `linvel` [m/s] and `angvel` [rad/s] of every body, drawn uniformly for each of them. A
-    goal with `low` and `high` is drawn uniformly between them. `reset(options=...)` fixes what it names for
-    this episode: `goal` (three numbers), `start_pos`, `start_linvel`, `start_angvel` (three for each body). The
+    Poses and velocities of the scene. `[environment.start]` has half widths of random variations, three numbers each.
+    For every body, variations drawn uniformly within them are added to `pos` [m], `linvel` [m/s] and `angvel` [rad/s].
+    A goal with `low` and `high` is drawn uniformly between them. `reset(options=...)` fixes the draws that it names,
+    for this episode: `goal` (three numbers), `start_pos`, `start_linvel`, `start_angvel` (three for each body). The
     other draws of a seed stay the same.
 
     ## Episode End

@@ -12,7 +12,7 @@ from rigid_env.tasks import layout as col
 
 
 def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
-    """Keys of every info, of a step and of a start."""
+    """Keys of every info, both of a step and of a start."""
     told = () if contacts is None else contacts.keys
     return ("is_success", *task.info_names, "physics_status", *told, *task.own_draws)
 
@@ -20,8 +20,8 @@ def keys(task: Task, contacts: ContactInfos | None = None) -> tuple[str, ...]:
 class BatchInfos:
     """Maker of the infos of a batch. All arrays are new in each info; its keys share one mask, which is read-only.
 
-    Numbers of one kind are rows of one array, so that few arrays need memory: a batch of few worlds takes as long for
-    memory as for anything else in an info.
+    Numbers of one kind are rows of one array, so that few arrays are allocated. In a small batch, allocation takes as
+    long as the rest of an info.
 
     Parameters
     ----------
