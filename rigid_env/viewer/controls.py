@@ -184,7 +184,7 @@ class Controls:
             self._ghost = Ghost(self.subject.world)
             self._jobs[GHOST] = Background(GHOST, self._ghost.warm)
 
-    # --- in the background -------------------------------------------------------------------------------------
+    # --- background jobs ---------------------------------------------------------------------------------------
 
     @property
     def is_compiling(self) -> bool:

@@ -24,7 +24,7 @@ from rigid_env.viewer.stage import LAYERS, Stage
 TITLE = "<title>Viser</title>"
 
 TIME_SLACK = 1e-9
-"""Largest share of the time between two pictures by which a look may come too early and still be taken."""
+"""Share of the time between two pictures by which a look may come too early and still be used."""
 
 HEIGHT = 480
 """[px] Height of the frame in a notebook."""

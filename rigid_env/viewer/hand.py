@@ -136,7 +136,7 @@ class HandOfUser:
             self.inner.begin(rows)
 
     def act(self) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Load (1, bodies, 6) of the coming control step, and a further one of its first physics step; or None."""
+        """Loads (1, bodies, 6) of the coming control step, and further loads of its first physics step; or None."""
         load, push = (None, None) if self.inner is None else self.inner.act()
         if self.pull is None:
             return load, push

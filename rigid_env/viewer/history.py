@@ -43,7 +43,7 @@ class Input(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """State of a run before step `index`, kept after the first `inputs` of the inputs given at that step.
+    """State of a run before step `index`, when the first `inputs` of the user's inputs before it had been applied.
 
     `size` is the memory of the state [bytes].
     """

@@ -1,4 +1,4 @@
-"""Marks for what a task or a scene declares: the goal, and wind, fluids and springs."""
+"""Marks in the picture for a task's goal, and for a scene's wind, fluids and springs."""
 
 from __future__ import annotations
 

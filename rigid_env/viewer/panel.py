@@ -15,7 +15,7 @@ SPEEDS = ("0.1", "0.25", "0.5", "1", "2", "4")
 SLIDERS = {"gravity": ("gravity [m/s²]", 0.0, 30.0, 0.01), "friction": ("friction", 0.0, 2.0, 0.01),
            "restitution": ("restitution", 0.0, 1.0, 0.01)}  # fmt: skip
 ROOM = "the room"
-"""Entry of the camera's menu that means: follow no body."""
+"""Entry of the camera's menu for a camera that follows no body."""
 
 KICK = 1.0
 """Change of a body's speed by a click, before the user changes it [m/s]."""

@@ -1,4 +1,4 @@
-"""Subjects that are simulated in a world, those in which the user can act, and a world without an environment."""
+"""Subjects that are simulated in a world: their base class, a class in which the user can act, and a bare world."""
 
 from __future__ import annotations
 
