@@ -17,7 +17,7 @@ AT_MOST, AT_LEAST, WITHIN = "at most", "at least", "within"
 
 
 class UnsupportedError(Exception):
-    """Error of a case that cannot run at a setting; the message says why. It never counts as a pass."""
+    """Error of a case that cannot run at a setting; the message gives the reason. It never counts as a pass."""
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,10 @@ class Setting:
 
     @property
     def is_event_driven(self) -> bool:
-        """True if our engine locates events, so that outcomes do not depend on the step.
+        """True if our engine locates events, so that outcomes do not depend on the length of the step.
 
-        Bodies that touch each other are then integrated with error control, which takes long: quick runs are smaller.
+        At such a setting, scenes whose bodies touch each other use error control, which takes long. Quick runs of these
+        scenes are smaller.
         """
         return self.maker is None and resolve(self.accuracy).scheme == "events"
 

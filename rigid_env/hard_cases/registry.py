@@ -8,7 +8,7 @@ from importlib import import_module
 from physics.keywords import nearest_first
 from rigid_env.hard_cases.case import Case
 
-# Modules of `rigid_env.hard_cases.cases`; each has a tuple CASES.
+# Modules of `rigid_env.hard_cases.cases`; each defines a tuple CASES.
 MODULES = (
     "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
     "chains", "stiff", "turning", "letting_go", "random_scenes", "company",

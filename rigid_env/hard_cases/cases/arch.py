@@ -20,7 +20,7 @@ SOLVED = 1e-7
 # Share by which the tested arches are thicker or thinner than the limit.
 NEAR = 0.005
 
-# Displacement of a stone from which on an arch has fallen, about a thickness [m].
+# Displacement of a stone beyond which the arch counts as fallen, about one thickness [m].
 FALLEN = 0.1
 
 

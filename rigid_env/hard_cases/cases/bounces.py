@@ -94,8 +94,8 @@ def _way(y: float, v: float, new_y: float, new_v: float) -> float:
 def elastic(on: Setting) -> Sequence[Check]:
     """The block bounces 10,000 times with e = 1, and its apex stays at the same height.
 
-    The energy E = m g (h + apex) must stay that of the start. An impact reverses the velocity in place. Each step and
-    each impact rounds the energy a few times, in the worst case always in the same direction.
+    The energy E = m g (h + apex) must stay the same. An impact reverses the velocity in place. Each step and each
+    impact rounds the energy a few times, in the worst case always in the same direction.
     """
     scene = _dropped(1.0)
     world = on.world(scene)
@@ -136,7 +136,7 @@ def restitution(on: Setting) -> Sequence[Check]:
         world = small.world(on_floor(block(linvel=(0, -speed, 0)), e))
         world.step()
         expected = e * speed - GRAVITY * small.dt
-        limit = 64 * EPS * speed  # it starts in touch: the impact is at once, and what follows a few operations
+        limit = 64 * EPS * speed  # it starts in contact: the impact is at once, and only a few operations follow
         found = world.linvel[0, 0, 1]
         checks.append(within("speed after a bounce at 0.5 mm/s, threshold 0", found, expected, limit, "m/s"))
     return checks

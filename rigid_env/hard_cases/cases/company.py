@@ -78,7 +78,7 @@ def bounce_in_company(on: Setting) -> Sequence[Check]:
 def _flat(on: Setting) -> Check:
     """Check the spin of a cube that falls flat on a block on the floor, until after its third impact.
 
-    The limit is what solves to the tolerance leave of v/a, speed over half the edge.
+    The limit is the solver's tolerance times v/a, the speed over half the edge.
     """
     side, h, e = 0.5, 0.5, 0.8
     bodies = [
@@ -93,7 +93,7 @@ def _flat(on: Setting) -> Check:
 
 
 def _lack(world: physics.World, on: Setting, h: np.ndarray, e: float) -> float:
-    """Largest error of the energy of bouncing balls after the first bounce, by m g h.
+    """Largest relative error of the energy of bouncing balls after the first bounce, as a share of m g h.
 
     The energy above the block should be e² m g h; `h` (worlds,) are the heights of fall [m].
     """

@@ -46,7 +46,7 @@ def _until_all_have_hit(aim, room: float) -> float:
 
 
 def _signed(world, aim, room: float) -> np.ndarray:
-    """Velocity of the sphere just after the corner: each further hit, which a far wall makes possible, is reversed.
+    """Velocity of the sphere just after the corner; each later reflection at a far wall is undone.
 
     `aim` is the velocity before, and `room` the distance from the middle to a wall, less the radius [m].
     """

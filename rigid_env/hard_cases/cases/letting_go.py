@@ -18,7 +18,7 @@ from rigid_env.hard_cases.case import Case, Check, Setting, none_of, within
 from rigid_env.hard_cases.cases.scenery import EPS, FLOOR, laws, on_floor, turned
 
 LEFT = physics.HalfSpace((1, 0, 0))
-LOOKS = 400  # angles at which a wall's push is evaluated, to find where it changes sign
+LOOKS = 400  # number of angles at which a wall's push is evaluated, to find where it changes sign
 
 
 class Release(NamedTuple):
@@ -30,7 +30,7 @@ class Release(NamedTuple):
 
 
 def _release(square: Callable, push: Callable, start: float, end: float) -> Release:
-    """Release of a body that starts at rest or moving at the angle `start`: the first zero of a wall's push.
+    """Find the release of a body that starts at the angle `start`: the first zero of a wall's push.
 
     `push` is the wall's force as a function of the angle, and `square` gives ω². The time is ∫ dθ/ω. A body at rest
     moves as the square root of the angle at first; with θ = start + s² the integrand is smooth.
@@ -54,7 +54,7 @@ def _released(on: Setting, scene: physics.Scene, duration: float, wall: int) -> 
 
 
 def _time_checks(on: Setting, scene: physics.Scene, time: float, end: float, wall: int) -> list[Check]:
-    """Checks that the body leaves `wall` once, at the right time; none for time stepping.
+    """Check that the body leaves `wall` once, at the right time; there are no checks for time stepping.
 
     Limit: the wall's push is off by at most ten times the tolerance, in units of the body's weight: some ten steps,
     each accurate to a hundredth of the tolerance, times a factor that amplifies errors. The push decreases by about the
@@ -208,7 +208,7 @@ def sticks_again(on: Setting) -> Sequence[Check]:
     """
     body = physics.Ellipsoid(AXES, WEIGHS, **rolling_start(AXES, START, SPIN))
     scene = on_floor(body, 0.0, FRICTION)
-    on.world(scene)  # or it is not supported
+    on.world(scene)  # raises UnsupportedError if the engine cannot simulate the scene
     end = physics.simulate(scene, STICKS, on.accuracy, on.dt)
     turn = 2 * math.acos(min(1.0, abs(float(np.dot(end.quat[-1, 0], ATTITUDE)))))
     away = math.hypot(*(end.pos[-1, 0, [0, 2]] - PLACE))

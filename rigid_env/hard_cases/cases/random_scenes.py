@@ -18,7 +18,7 @@ from physics.kernels.state import layout as at
 from rigid_env.hard_cases.case import Case, Check, Setting, none_of
 from rigid_env.hard_cases.cases.random_draws import HALF_WIDTH, begin, draw_wrench, scene_of
 
-# Share of its energy from which on a gain is so large that the world is stopped.
+# Relative energy gain beyond which a world is stopped.
 GROSS = 1e-3
 
 # Number of steps with each of two wrenches, and of steps without a wrench after them.
@@ -27,7 +27,7 @@ PUSHED, FREE = 5, 20
 
 @dataclass(frozen=True)
 class Look:
-    """Quantities at one moment that the laws are about, each an array (worlds,)."""
+    """Quantities at one moment that the checked laws are about, each an array (worlds,)."""
 
     kinetic: np.ndarray  # [J]
     energy: np.ndarray  # kinetic and potential [J]
@@ -108,7 +108,7 @@ class Outcome:
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
-        """Hold the last step against the laws of this module, note what breaks one, and return the quantities after it.
+        """Check the last step against the laws, note violations, and return the quantities after the step.
 
         Parameters
         ----------
@@ -159,7 +159,7 @@ def drive(
 
     Notes
     -----
-    A world that has gained more than `GROSS` is put at rest: it would gain more and more, and be slow.
+    A world that has gained more than `GROSS` is put at rest: it would keep gaining energy and take long to step.
     """
     begin(world, rng)
     outcome = Outcome.start(world.worlds)

@@ -31,7 +31,7 @@ def rolling(on: Setting) -> Sequence[Check]:
     reached to the tolerance of a contact problem. The angular momentum about the ground is (7/5) m v r when it rolls.
     """
     v, mu, radius = 5.0, 0.2, 1.0
-    # The floor is one of six walls, and the others are far away: so case 8, a sphere in a box, uses the same kernel.
+    # The floor is one of six walls; the other five are far away. So case 8, a sphere in a box, uses the same kernel.
     sphere = physics.Sphere(radius, 1.0, pos=(0, radius, 0), linvel=(v, 0, 0))
     scene = boxed(sphere, (1e3, 1e3, 1e3), 0.0, mu, (0, -GRAVITY, 0), origin=(0, 1e3, 0))
     world = on.world(scene)

@@ -70,7 +70,7 @@ def tips_on_incline(on: Setting) -> Sequence[Check]:
         found.append(angle_to(world, upright))
     beyond = angle - math.atan(b / h)
     truth = pendulum(beyond, rate, world.time) - beyond
-    # Settling within a slop may turn it by that before it starts: the same share of `beyond`.
+    # Settling within a slop may rotate the block before it starts to tip: the same share of `beyond`.
     limit = (_slack(on, rate, world.time) + 4 * on.slop * reach / b / beyond) * (truth + beyond)
     return [
         Check("turn, tanθ 1 % below b/h", found[0], 4 * on.slop * reach / b, "rad"),

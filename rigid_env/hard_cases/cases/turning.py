@@ -24,7 +24,7 @@ def _rod(**start) -> physics.Block:
 
 
 def _things() -> dict[str, tuple[physics.Body, float, float]]:
-    """Bodies that the rod meets, by name, with radii [m] of the largest ball inside and the smallest around each."""
+    """Bodies that the rod may hit, by name, with radii [m] of the largest ball inside and the smallest around each."""
     size = 0.1
     corners = tuple(tuple(float(s * size) for s in row) for row in (*np.eye(3), *-np.eye(3)))
     return {
@@ -45,7 +45,7 @@ def _spread(count: int, k: float) -> np.ndarray:
 
 
 def past_things(on: Setting) -> Sequence[Check]:
-    """A rod rotates about its middle by 0.3 to 3 rad per step: it hits all bodies within its reach, and no other.
+    """A rod rotates about its middle by 0.3 to 3 rad per step: it hits all bodies within its reach, and no others.
 
     The middles of its ends move on a circle of radius 1 m. A body with its centre in the plane of this circle that
     contains a ball of radius r is hit if its centre is nearer than 1 m + r to the rod's middle. A body inside a ball of
