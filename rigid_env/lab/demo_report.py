@@ -10,7 +10,7 @@ from rigid_env.lab.demo import Demo
 from rigid_env.terminal import Column, Table, number_columns, say
 
 SHOWN_EVENTS = 24
-LAST_EVENTS = 8  # of the shown events, those from the end of the run
+LAST_EVENTS = 8  # number of the shown events that are from the end of the run
 FEW = 8  # largest number of bodies, or of contact points, that are printed one by one
 QUANTITIES = (("pos", "m"), ("quat", ""), ("linvel", "m/s"), ("angvel", "rad/s"))
 AXES = "x", "y", "z"

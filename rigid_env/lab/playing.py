@@ -1,4 +1,4 @@
-"""Play episodes of a trained policy, and write them as a video."""
+"""Play episodes of a trained policy, and write them as an animated GIF."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from rigid_env.envs.policy_files import load_policy
 from rigid_env.rendering.picture import GIF_COLOURS, write_gif
 
 SIZE = (480, 300)  # width and height of the pictures [px]
-FRAME_TIME = 0.05  # between pictures: an exact number of hundredths, in which a GIF counts [s]
-STILL = 10  # times that the last picture of an episode is shown
+FRAME_TIME = 0.05  # time between pictures, an exact number of hundredths of a second, the unit of time in a GIF [s]
+STILL = 10  # repetitions of an episode's last picture
 
 
 def write_video(
@@ -23,19 +23,19 @@ def write_video(
     Parameters
     ----------
     env_id : str
-        Of an environment with a trained policy.
+        Id of an environment with a trained policy.
     path : Path
     seeds : iterable of int
     accuracy : str
     size : tuple of int
         Width and height of the pictures [px].
     colours : int
-        Of the pictures: fewer make a smaller file.
+        Number of colours of the pictures; fewer make a smaller file.
 
     Returns
     -------
     list of str
-        How each episode ended.
+        Outcome of each episode, such as "success after 3.20 s".
 
     Raises
     ------
@@ -56,7 +56,7 @@ def write_video(
 
 
 def _episode(env: gym.Env, policy, seed: int) -> tuple[list, str]:
-    """Pictures of an episode, `FRAME_TIME` apart, and how it ended."""
+    """Play one episode; return its pictures, `FRAME_TIME` apart, and a text about its outcome."""
     control_dt = env.unwrapped.task.control_dt
     observation, _ = env.reset(seed=seed)
     pictures, shown, steps, is_over = [env.render()], FRAME_TIME, 0, False

@@ -9,7 +9,7 @@ from physics import Replay, Status
 from physics.io.recording import origin
 from rigid_env.terminal import Table, number_columns, say
 
-# Most rows of the table; of a longer recording it shows the last steps, which led to the reason for keeping it.
+# Most rows of the table. For a longer recording it shows the last steps, which led to the fault that was recorded.
 LAST_ROWS = 20
 
 

@@ -37,7 +37,7 @@ class PeerWorld:
 
 
 def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
-    """Run a case in another engine at its settings, one after the other, until it holds or is not supported.
+    """Run a case in another engine at the engine's settings, one after the other, until it holds or is not supported.
 
     Returns the outcome that holds; if there is none, the outcome at the first setting, the engine's defaults.
     """

@@ -60,7 +60,7 @@ class Plan:
 def make_plan(
     cases: tuple[Case, ...], accuracy: str, dt: float, steps: str, is_thorough: bool, has_peers: bool
 ) -> Plan:
-    """Make a plan from what the user typed; `accuracy` and `steps` are lists with commas.
+    """Make a plan from a user's input; `accuracy` and `steps` are lists with commas.
 
     Raises
     ------
@@ -136,12 +136,13 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None, place: 
     """Run all cases of a plan with a progress bar, and print tables of the outcomes.
 
     `keep` is a file that is updated with all outcomes after each run. Ctrl-C ends the runs; the tables are still
-    printed. With `place` the cases of our engine run there, each at one setting; one that prints its jobs runs none.
+    printed. With a `place`, the cases of our engine run as its jobs, one for each case and setting. A place that prints
+    its jobs runs none of them.
 
     Raises
     ------
     ValueError
-        If other engines are to run at a place.
+        Other engines are requested together with a place.
     """
     if place is not None and plan.has_peers:
         raise ValueError("peers is True with a launcher; allowed is one of the two: other engines run in this process")
@@ -170,14 +171,14 @@ def run_and_show(console: Console, plan: Plan, keep: Path | None = None, place: 
 
 
 def _here(runs: Sequence[Run], tell: Callable) -> Iterator[tuple[str, Outcome]]:
-    """Run one after the other in this process; `tell` takes the name of each before it starts."""
+    """Run cases one after the other in this process; `tell` takes the name of each run before it starts."""
     for run in runs:
         tell(description=run.name)
         yield run.name, run.call()
 
 
 def _there(runs: Sequence[Run], place: Place) -> Iterator[tuple[str, Outcome]]:
-    """Run at a place; a run that is lost there fails."""
+    """Run cases as jobs of a launcher; a run whose worker is lost counts as failed."""
     by_name = {run.name: run for run in runs}
     for name, outcome, error, _ in place.run([run.job(place.folder) for run in runs]):
         yield name, by_name[name].lost(error) if outcome is None else outcome
@@ -198,7 +199,7 @@ class Run:
     call: Callable[[], Outcome]
 
     def job(self, folder: Path) -> Job:
-        """Make the job that does the same elsewhere; its command writes a file into `folder`."""
+        """Make a job that does the same run in another process; its command writes a file into `folder`."""
         on = self.setting
         words = ["rigid-env", "hard-cases", str(self.case.number), "--accuracy", str(on.accuracy), "--dt", repr(on.dt)]
         words += [] if on.is_thorough else ["--quick"]
@@ -206,14 +207,14 @@ class Run:
         return Job(self.name, self.call, shlex.join([*words, "--json", str(path)]))
 
     def lost(self, error: str) -> Outcome:
-        """Return the outcome of a run whose worker was lost."""
+        """Outcome of a run whose worker was lost."""
         return Outcome(self.case, OURS, str(self.setting.accuracy), self.setting.dt, Status.FAILS, (), error, 0.0)
 
 
 def _runs(plan: Plan, engines: Sequence[Engine]) -> list[Run]:
-    """List all runs: ours case by case, then other engines on cases that look at motion alone.
+    """List all runs: ours case by case, then other engines on cases that check only the motion.
 
-    Other engines make the shorter runs, for all their settings are tried.
+    Other engines make the shorter runs, because each case is tried at all of an engine's settings.
     """
     short = Setting(dt=plan.dt, is_thorough=False)
     ours = [

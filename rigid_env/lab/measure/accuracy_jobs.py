@@ -1,4 +1,4 @@
-"""Measure scenes in other processes, each scene whole in one of them: its settings are timed in turns."""
+"""Measure scenes in other processes: each process measures a whole scene, whose settings are timed in turns."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def measure(scene: str, engines: tuple[str, ...], ladder: Ladder, duration: floa
 
 
 def found(jobs: Sequence[accuracy.Job], ends: Iterable[Ended], tick: Tick) -> Iterator[Found]:
-    """Yield what was measured as it comes; `tick` takes the name of each scene.
+    """Yield the measurements of each scene as soon as they come; `tick` takes the name of the scene.
 
     Raises
     ------

@@ -68,7 +68,7 @@ def measure_and_show(
 ) -> Report:
     """Measure scenes, and print the table of each as soon as it is measured.
 
-    With `place` each scene is measured there; a place that prints its jobs measures none.
+    With a `place`, each scene is measured by one of its jobs. A place that prints its jobs measures none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Measured cube tosses: read them from files, and split them into tosses for the fit and the rest.
+"""Measured cube tosses: read them from files, and split them into tosses to fit and tosses to test.
 
 Two formats are read. Both are of the public ContactNets data set (Pfrommer, Halm and Posa, *ContactNets: Learning
 Discontinuous Contact Dynamics with Smooth, Implicit Representations*, CoRL 2020):

@@ -40,7 +40,7 @@ def _draw_ladder(axes, report: Report, name: str, unit: str) -> None:
     )
     axes.plot(times, errors, "o", label="mean over the tosses not fitted")
     for k, (rung, us, error) in enumerate(zip(report.ladder, times, errors)):
-        place = (0, 7 if k % 2 else -14)  # above and below by turns: neighbours may be close
+        place = (0, 7 if k % 2 else -14)  # alternately above and below the points, since neighbours may be close
         axes.annotate(rung.accuracy, (us, error), xytext=place, textcoords="offset points", ha="center", fontsize=8)
     axes.set_xscale("log")
     axes.set_xlim(min(times) / 2.0, max(times) * 2.0)
