@@ -147,9 +147,9 @@ def replay(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording that physics.Recorder wrote.")],
     json: Json = None,
 ) -> None:
-    """Take recorded steps again, and say whether they come out the same, bit for bit.
+    """Repeat recorded steps, and say whether the results have the same bits.
 
-    By another compiler of kernels than the recording's they are compared within a tolerance.
+    If the recording was made with another compiler of kernels, the results are compared within a tolerance.
     """
     with told_errors():
         if not file.is_file():

@@ -1,4 +1,4 @@
-"""Options of commands whose parts can run in many processes or on many machines."""
+"""Options of commands that can run their jobs in many processes or on many machines."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Address = Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm 
 
 
 def make_place(launcher: str | None, at_once: int, address: str | None, json: Path | None) -> Place | None:
-    """Return where jobs run, None for this process; their files go beside `json`, in a folder of its name.
+    """Make the launcher of a command's jobs, or None for this process; its files go into a folder named like `json`.
 
     Raises
     ------
     ValueError
-        If there is no such launcher, or one is needed.
+        There is no such launcher, or `address` is given without one.
     """
     if launcher is None:
         if address is not None:

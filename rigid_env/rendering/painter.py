@@ -33,10 +33,11 @@ LINE_REACH = 3.0
 """[px] Largest distance of a body's outline from the body, in pictures up to 600 px high; it grows with the height."""
 
 SMALL = 20_000
-"""Most pixels of a picture that is always drawn whole, since finding the part with the bodies would take longer."""
+"""Largest number of pixels of a picture that is always drawn whole; finding the part with the bodies would take longer.
+"""
 
 KEPT_PIXELS = 5_000_000
-"""Most pixels of all cached backdrops together: eight pictures of 960 x 600 px, or 700 of 84 x 84 px."""
+"""Largest number of pixels of all cached backdrops together: eight of 960 x 600 px, or 700 of 84 x 84 px."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ def takes(group: Callable[P, Group]) -> Callable[[Callable[[Made, Group], None]]
 
 
 def part(given: Any, *groups: type) -> dict[str, Any]:
-    """Values of the fields of some `groups`, by name, from an instance of a dataclass that inherits from them."""
+    """Collect the fields of some `groups`, by name, from a dataclass instance that inherits from them."""
     return {each.name: getattr(given, each.name) for group in groups for each in fields(group)}
 
 

@@ -96,7 +96,7 @@ class EdgesInside(Distribution):
 
     def read(self, field, value, worlds):
         edges = self.edges.read(field, value, worlds)
-        if (edges > 0.0).all():  # other sizes are refused later, as no sizes at all
+        if (edges > 0.0).all():  # `Draws.read` refuses edges that are not positive later, with a better message
             self.area.check_room(edges[np.argmax(np.linalg.norm(edges, axis=1))], field)
         return edges
 

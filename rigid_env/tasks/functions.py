@@ -85,7 +85,7 @@ class Functions:
         self._measure(worlds)
         task.begin(worlds)
         terms = self._look(worlds)
-        own: Any = task  # its own in place of its class's
+        own: Any = task  # set on the instance, where they hide the class's attributes
         own.measures, own.terms = tuple(map(str, worlds.measured)), tuple(map(str, terms))
         out = np.zeros((2, col.INFO + len(terms) + len(worlds.measured)))
         self._fill("measure", worlds.measured, task.measures, out, col.INFO)

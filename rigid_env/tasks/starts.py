@@ -208,7 +208,7 @@ class Starts(Declaration):
         return {**self._own_starts, **given}
 
     def _check_starts(self) -> None:
-        """Raise a ValueError if some draws lead to impossible starts; kinds of tasks that can tell override it."""
+        """Raise a ValueError if some draws lead to impossible starts; a subclass that knows its draws overrides it."""
 
     @property
     def place_options(self) -> tuple[str, ...]:

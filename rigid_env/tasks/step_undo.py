@@ -9,7 +9,7 @@ from rigid_env.tasks.task_parts import Stepped
 
 
 class StepUndo:
-    """Room for a copy of everything that a control step changes.
+    """Memory for a copy of everything that a control step changes.
 
     Parameters
     ----------
