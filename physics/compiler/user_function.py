@@ -28,7 +28,7 @@ class Examined(NamedTuple):
 
 
 class FaultyFunctionError(Exception):
-    """Error about a user's function that reads or changes something that it must not.
+    """Error about a user's function that reads or changes memory that it must not use.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _COUNTS_FROM_FRONT = is_on("indices_from_front")
 
 
 def _lengths(builder, array_type, array, member, known) -> list:
-    """Lengths of the axes of an array, or its strides [bytes], as LLVM values: constants if the type fixes them.
+    """Lengths of the axes of an array, or its strides [bytes], as LLVM values; constants if the type fixes them.
 
     `member` is `_SHAPE` or `_STRIDES`; `known` reads the same from a type of fixed size.
     """

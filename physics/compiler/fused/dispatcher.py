@@ -60,7 +60,7 @@ class _WholeCompiler(CompilerBase):
     """Compiler of a whole, a kernel that Python calls: it runs the passes of `kernel_passes` to a `WholeLibrary`."""
 
     library_class: type[JITCodeLibrary] = WholeLibrary
-    is_entered = True  # whether it gets an entry for calls from outside: see `prepared_entry`
+    is_entered = True  # True: the kernel gets an entry for calls from machine code outside of it, see `prepared_entry`
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, local_types):
         flags = _Flags(flags)
@@ -128,7 +128,7 @@ class _SharedCompiler(_PartCompiler):
 
 
 class _AnyPartCompiler(_PartCompiler):
-    """Compiler of a part that may contain any Python that Numba knows, as users' functions do: Numba's own passes."""
+    """Compiler of users' functions, which may contain any Python that Numba supports, by Numba's own passes."""
 
     def passes(self):
         return numbas_passes(self.state, {NativeLowering: UserLowering}, _KeepAsPart)
@@ -233,7 +233,7 @@ class Kernel(CPUDispatcher):
             return super().compile(sig)
 
     def stand(self, args: tuple) -> None:
-        """Load or compile the code that other kernels call, for these types of arguments."""
+        """Load or compile the code that other kernels call, for arguments of these types."""
         self._part.compile(args)
 
     def as_part(self, args: tuple):

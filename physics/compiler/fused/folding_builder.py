@@ -35,7 +35,7 @@ class StructInMemory:
         self._members: dict[int, StructInMemory | ir.Value] = {}
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """Member number `k`: a value that is read at the entry of the function, or a `StructInMemory`."""
+        """Return member number `k`: an LLVM value that is read at the entry of the function, or a `StructInMemory`."""
         if k not in self._members:
             with builder.goto_entry_block():
                 address = builder.gep(self.address, [ir.Constant(ir.IntType(32), n) for n in (0, k)], inbounds=True)
@@ -69,7 +69,7 @@ class StructByMembers:
         self._members = tuple(members)
 
     def member(self, builder: ir.IRBuilder, k: int):
-        """Member number `k`, as an LLVM value or a structure."""
+        """Return member number `k`, as an LLVM value or a structure."""
         return ir.Constant(member_type(self.type, k), ir.Undefined) if self._members[k] is None else self._members[k]
 
     def changed(self, builder: ir.IRBuilder, value, position: tuple[int, ...]):

@@ -38,7 +38,8 @@ class _Values(Lower):
         value = self._blk_local_varmap.get(name)
         if value is not None:
             return value
-        self._singly_assigned_vars.discard(name)  # the block that uses it is lowered before the one that assigns it
+        # this block, which uses the variable, is lowered before the block that assigns it
+        self._singly_assigned_vars.discard(name)
         return self.builder.load(self.getvar(name))
 
     def alloca_lltype(self, name, lltype, datamodel=None):

@@ -131,8 +131,8 @@ class MemoisedTarget(CPUContext):
 
     lowerings: ClassVar[dict[tuple, Callable]] = _make_table()  # by operation, signature, error model, index checks
     absent: ClassVar[dict[tuple, bool]] = _make_table()  # operations without a lowering, and their signatures
-    asked: ClassVar[dict] = _make_table()  # operations for which Numba has looked through its registries
-    sizes: ClassVar[dict] = _make_table()  # of LLVM types [bytes]
+    asked: ClassVar[dict] = _make_table()  # operations for which Numba's registries have been searched
+    sizes: ClassVar[dict] = _make_table()  # sizes of LLVM types [bytes]
 
     def __init__(self, context):
         self.__dict__ = context.__dict__

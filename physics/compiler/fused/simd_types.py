@@ -53,7 +53,7 @@ _model_of(LanesType, _DOUBLE)
 _model_of(MaskType, ir.IntType(1))
 
 
-# --- of what type ------------------------------------------------------------------------------------------------
+# --- types of results -----------------------------------------------------------------------------------------
 
 _SUMS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul", operator.truediv: "fdiv"}
 _ORDERS = {operator.lt: "<", operator.le: "<=", operator.gt: ">", operator.ge: ">=", operator.eq: "=="}
@@ -143,7 +143,7 @@ for _function in _NAMED:
     infer_global(_function)(type(f"Of_{_function.__name__}", (_Named,), {"key": _function}))
 
 
-# --- how it is lowered -------------------------------------------------------------------------------------------
+# --- lowering -------------------------------------------------------------------------------------------------
 
 
 def _spread(builder, value):

@@ -53,7 +53,7 @@ class _Network(ConstraintNetwork):
         self._seen.append(None)
 
     def propagate(self, typeinfer):
-        """Check the constraints once; return a list of the errors, such as types that are not known yet."""
+        """Check each constraint once; return a list of errors, such as types that are not known yet."""
         wrong = []
         for k, constraint in enumerate(self.constraints):
             if self._seen[k] == self._types(k, typeinfer.typevars):

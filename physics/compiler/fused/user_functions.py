@@ -108,7 +108,7 @@ class _Reader:
 
 
 def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
-    """Names of variables that are p: the names `own`, and variables that are assigned only once, from one of them."""
+    """Names of variables that refer to p: the names `own`, and variables assigned only once, from one of them."""
     found, times = set(own), Counter(each.target.name for each in assigned)
     for each in assigned:
         if isinstance(each.value, ir.Var) and each.value.name in found and times[each.target.name] == 1:
@@ -117,7 +117,7 @@ def _also_called(own: set[str], assigned: list[ir.Assign]) -> set[str]:
 
 
 def _asks_for_size(value, own: set[str]) -> bool:
-    """True if a value may be computed from p's length: a constant index may then be guarded by a test of the length."""
+    """True if a value may be computed from p's length; a test of the length may then guard a constant index."""
     if not isinstance(value, ir.Expr):
         return False
     if value.op == "getattr":
