@@ -169,7 +169,7 @@ class Batch(Exclusive):
         self.time += duration
 
     def _make_with_more(self, calls: list[BoundCall]) -> None:
-        """Make kernel calls; tell fields the time before them, and keep the impacts after them."""
+        """Make kernel calls; set the time of fields before them, and keep the impacts after them."""
         if self.plan.fields:
             self._make_with_fields(calls)
         else:
@@ -178,7 +178,7 @@ class Batch(Exclusive):
             self.impacts.note(self)
 
     def continue_step(self) -> None:
-        """Let the next kernel call belong to the step of the last one: `World.read_impacts` then reads both."""
+        """Count the next kernel call as a part of the last step, so that `World.read_impacts` reads both calls."""
         if self.impacts is not None:
             self.impacts.go_on(self)
 
@@ -188,7 +188,7 @@ class Batch(Exclusive):
             self.impacts.forget(self, chosen)
 
     def _make_with_fields(self, calls: list[BoundCall]) -> None:
-        """Tell fields the time, and make kernel calls; an exception in a user's field is reworded to name its class."""
+        """Set the time of fields, and make kernel calls; an error in a user's field is reworded to name its class."""
         for scratch in self.scratch:
             body_records(scratch)["call_start"] = self.time
         try:
@@ -201,7 +201,7 @@ class Batch(Exclusive):
         return np.zeros((self.worlds, self.body_count, 6))
 
     def kept(self) -> tuple[np.ndarray, ...]:
-        """Arrays that a snapshot copies, in the order of `KEPT`: the batch's own, not copies."""
+        """Arrays of the batch (no copies) that a snapshot copies, in the order of `KEPT`."""
         return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:

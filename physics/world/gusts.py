@@ -63,10 +63,10 @@ def set_winds(world: Batch, worlds: np.ndarray, velocity: np.ndarray) -> None:
     Parameters
     ----------
     world : Batch
-        Of a scene with `physics.Wind`.
+        Batch of a scene with `physics.Wind`.
     worlds : (k,) int64
     velocity : (k, 3) float
-        World frame, finite [m/s].
+        Mean velocities of the wind, world frame, finite [m/s].
     """
     params = world.params.reshape(world.worlds, world.body_count, -1)
     for first in _winds(world.plan):

@@ -109,7 +109,7 @@ class KeptImpacts:
         self._earlier: list[tuple[np.ndarray, np.ndarray]] = []  # events and counts of earlier calls of the step
 
     def note(self, world: Batch) -> None:
-        """Take note of a kernel call that was just made; events without room are added to the batch's report."""
+        """Record that a kernel call was made; its events without room are added to the batch's report."""
         if not self._goes_on:
             self._earlier = []
         self.is_known, self._goes_on = True, False

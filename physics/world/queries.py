@@ -143,7 +143,7 @@ class Querying(Batch):
             Poses of the shape, as of a body: centre of mass [m] and attitude (w, x, y, z), for n worlds. (poses, 3|4):
             the same for all worlds; (3|4,) and (n, 1, 3|4): the same for all poses.
         max_distance : float
-            Largest gap of a result [m]; what is farther away is left out, and costs less.
+            Largest gap of a result [m]; bodies farther away are left out, and cost less time.
         exclude : int, optional
             Index of a body that is left out.
         worlds : (n,) int array_like or (worlds,) mask, optional
@@ -185,7 +185,7 @@ class Querying(Batch):
         exclude: int | None = None,
         worlds: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
-        """Tell where a shape in given poses touches or overlaps a body or a wall: (n, poses) bool.
+        """Test which poses of a shape touch or overlap a body or a wall: (n, poses) bool.
 
         `margin` [m] is a gap that counts as touching. `nearest_to` has all other arguments and the errors.
         """

@@ -16,9 +16,10 @@ from physics.summary import shown
 def vectors(
     value: ArrayLike, worlds: int, field: str, each: str = "rays", may_vanish: bool = True
 ) -> NDArray[np.float64]:
-    """Convert vectors for each `each`, such as rays, of `worlds` worlds to an array (worlds or 1, rays or 1, 3).
+    """Convert the vectors of rays or poses in `worlds` worlds to an array (worlds or 1, rays or 1, 3).
 
-    The first vector that is not finite, or has zeros only unless it `may_vanish`, is named in an error.
+    `each` is the word for the rays or poses in an error. The error names the first vector that is not finite, or that
+    is zero if `may_vanish` is False.
     """
     shapes = f"shape ({worlds}, {each}, 3), ({each}, 3) or (3,)"
     array = validation.floats(value, field, f"are numbers in {shapes}")
@@ -35,13 +36,13 @@ def vectors(
 
 
 def row_steps(table: np.ndarray) -> tuple[int, int]:
-    """Steps in rows from a world to the next, and from a ray to the next; 0 where all have the same vector."""
+    """Numbers of rows from one world to the next, and from one ray to the next; 0 if all share the same vector."""
     worlds, rays, _ = table.shape
     return (rays if worlds > 1 else 0), (1 if rays > 1 else 0)
 
 
 def common_count(tables: Mapping[str, np.ndarray], each: str) -> int:
-    """Number of rays or poses that arrays (worlds or 1, rays or 1, ...) share; ValueError if they have others."""
+    """Number of rays or poses that arrays (worlds or 1, rays or 1, ...) share; ValueError if their numbers differ."""
     count = max(table.shape[1] for table in tables.values())
     if any(table.shape[1] == 0 for table in tables.values()):
         count = 0

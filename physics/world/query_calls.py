@@ -91,7 +91,7 @@ def _queue_of(count: int) -> WorkQueue:
 
 
 def _contents(value):
-    """Numbers of a question, and address and shape of each of its arrays: equal ones can share a bound call."""
+    """Key of a question: its numbers, and address and shape of each of its arrays. Equal keys share a bound call."""
     if isinstance(value, tuple):
         return tuple(map(_contents, value))
     return (value.ctypes.data, value.shape) if isinstance(value, np.ndarray) else value

@@ -38,7 +38,7 @@ def run_wrenches(world: Batch, wrenches: np.ndarray, into: Room, steps: int, dt:
 
 
 def _needs_python(world: Batch, steps: int) -> bool:
-    """True if the actuator must be called from Python between two of the steps: with a delay, or `takes_each_step`."""
+    """True if Python must call the actuator between two steps: it has a delay, or `takes_each_step` is true."""
     if world.actuation is None:
         return False
     return world.actuation.actuator.delay > 0.0 or (steps > 1 and takes_each_step(world))

@@ -23,7 +23,7 @@ from physics.world.wall_distance import geometric_centres, wall_gaps
 # Largest depth in a wall, in bounding radii, at which a body may be put: the error of a rounded or hand-typed pose.
 START_DEPTH = 1e-2
 
-# The same for a wall with springs, which carry a body by its depth: the centre of mass stays outside.
+# Largest depth in a wall with springs, which carry a body by its depth: the centre of mass stays outside.
 SOFT_DEPTH = 1.0
 
 # The centres of two bodies count as equal within this share of the smaller bounding radius, which allows for rounding.
@@ -193,7 +193,7 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
     shape = (len(chosen), world.body_count)
     centres = geometric_centres(world, state, params).reshape(*shape, 3)
     radii = params[:, at.RADIUS].reshape(shape)
-    with np.errstate(over="ignore", invalid="ignore"):  # a step will tell of numbers that are too large
+    with np.errstate(over="ignore", invalid="ignore"):  # the report of a step tells about numbers that are too large
         order = np.argsort(centres @ SKEW, axis=1, kind="stable")
         centres = np.take_along_axis(centres, order[:, :, None], axis=1)
         apart = np.abs(np.diff(centres, axis=1)).max(axis=2)
@@ -272,7 +272,7 @@ def _needs(field: str, is_on, effect: str) -> None:
 
 
 def _check_settings(friction: Friction, declared: Friction) -> None:
-    """Refuse a `Friction` whose settings that are the same in all worlds are not the scene's."""
+    """Refuse a `Friction` that differs from the scene's in a setting that all worlds share."""
     for name in ("axis", "rule", "pairs"):
         given, own = getattr(friction, name), getattr(declared, name)
         if given != own:
@@ -282,7 +282,7 @@ def _check_settings(friction: Friction, declared: Friction) -> None:
 
 
 def _changed_slots(world: Batch, effects) -> list[FieldSlot]:
-    """Field slots of the scene whose fields `effects` replace, with the new fields in them; ValueError for others."""
+    """Field slots of the scene with the fields that `effects` replace; ValueError for a field without a slot."""
     kinds: dict[type, list[Field]] = {}
     for effect in effects:
         if not isinstance(effect, Field):

@@ -1,4 +1,4 @@
-"""Snapshots: copies of everything that decides how worlds go on, in memory and as files."""
+"""Snapshots: copies of everything that decides the future of worlds, in memory and as files."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from physics.world.headed_file import FileKind, head_value, is_text
 FILE = FileKind("snapshot", "snapshot", "Snapshot.save", format=2)
 TIMES = 1  # the format in which commands have times instead of ages, and the settings of the scene are missing
 
-# Arrays that decide how a `World` goes on, in the order of `Snapshot.arrays`; the last one only where bodies may sleep.
+# Arrays that decide the future of a `World`, in the order of `Snapshot.arrays`; the last one only if bodies may sleep.
 KEPT = ("state", "params", "gravity", "memory", "report_table", "sleep")
 
 
@@ -40,8 +40,8 @@ class Snapshot:
         Wrench that the actuator's lag has reached, (worlds * bodies, 6), and its delayed commands, oldest first: a list
         of the age of each [s] and the command (worlds * bodies, 6). None without an actuator.
     compiler : str
-        Compiler of the session that took it (`physics.compiler.compiler_choice`). Under another compiler a world goes
-        on with other last bits.
+        Compiler of the session that took it (`physics.compiler.compiler_choice`). Under another compiler the future of
+        a world differs in its last bits.
     is_read : bool
         Whether the snapshot was read from a file, so that its numbers are checked before it is restored.
     scene : dict of str to str or None

@@ -35,7 +35,7 @@ class Stepper:
     dt : float, optional
         Length of a step [s]; None: that of the world.
     then : Callable, optional
-        Makes the kernel call with which each thread goes on after its steps. It takes the thread's list of worlds
+        Function that makes a kernel call, which each thread runs after its steps. It takes the thread's list of worlds
         stepped, an array of `physics.kernels.parallel.work_stealing` that every call renews, and returns a bound call
         (`physics.parallel.bound_call.bound`).
 
@@ -52,7 +52,7 @@ class Stepper:
         dt: float | None = None,
         then: Callable[[np.ndarray], BoundCall] | None = None,
     ):
-        if not hasattr(world, "no_wrench"):  # the class itself knows this module
+        if not hasattr(world, "no_wrench"):  # the class `World` itself imports this module
             raise ValueError(f"world is {shown(world)}; allowed is a physics.World")
         if then is not None and not callable(then):
             raise ValueError(f"then is {shown(then)}; allowed are None and a function of the list of worlds taken")
@@ -63,7 +63,7 @@ class Stepper:
         self._then = then
         self._calls: list[BoundCall] | None = None
         self._afterwards: list[BoundCall] = []
-        self._alone: Any = None  # the only one of `_calls`, where a step is this call and nothing else
+        self._alone: Any = None  # the single call in `_calls`, if a step consists of it alone
         self._perform: Callable[[], bool] | None = None  # method of `_alone`
         self._duration = self.steps * self.dt
 
@@ -134,8 +134,8 @@ def takes_each_step(world: Batch) -> bool:
 def _is_all(world: Batch, calls: list[BoundCall]) -> bool:
     """True if a step consists of the single call in `calls`: one thread, no actuator, and `Batch.is_plain`.
 
-    These are all other parts of `World.advance`, save the recorder. A recorder may come and go, so that each call of a
-    `Stepper` looks for it.
+    Then `World.advance` does nothing else, apart from the recorder. A recorder may be added later, so each call of a
+    `Stepper` looks for one.
     """
     return len(calls) == 1 and world.actuation is None and world.is_plain
 

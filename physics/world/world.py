@@ -348,7 +348,7 @@ class World(Touching, Querying):
     @known_keywords
     @exclusive
     def snapshot(self, worlds: ArrayLike | None = None, out: Snapshot | None = None) -> Snapshot:
-        """Copy the whole state of worlds; after `restore` they go on from it bit for bit, warm starts included.
+        """Copy the whole state of worlds, warm starts included; after `restore` they continue bit for bit.
 
         Parameters
         ----------
@@ -368,7 +368,7 @@ class World(Touching, Querying):
     def restore(
         self, snapshot: Snapshot, worlds: ArrayLike | None = None, source: ArrayLike | int | None = None
     ) -> None:
-        """Set worlds to the state in a snapshot; from it they go on bit for bit like the worlds that were copied.
+        """Set worlds to the state in a snapshot; they then continue bit for bit like the worlds that were copied.
 
         Parameters
         ----------
