@@ -1,7 +1,7 @@
 """Scenes as plain data: dicts, lists, numbers and text, the content of a scene file.
 
 A body, wall or effect is a table: `kind` is the class, the other keys are its parameters under their names, in SI
-units. What is left out keeps its default.
+units. Parameters that are left out keep their defaults.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "
 
 
 def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
-    """Lists of a scene that are not empty, by name, each of tables."""
+    """Convert a scene to plain data: its lists that are not empty, by name, with a table for each element."""
     tables = {name: [plain_table(item) for item in getattr(scene, name)] for name in KINDS}
     return {name: table for name, table in tables.items() if table}
 
 
 def plain_table(item) -> dict[str, Any]:
-    """Table of a body, wall or effect; parameters at their defaults are left out."""
+    """Convert a body, wall or effect to a table; parameters at their defaults are left out."""
     found = {} if isinstance(item, HalfSpace) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
@@ -48,7 +48,7 @@ def _plain(value):
 
 
 def read_effects(effects) -> tuple:
-    """Effects, each given as an object or as a table of a scene file.
+    """Read effects, each given as an object or as a table of a scene file.
 
     Raises
     ------
@@ -62,14 +62,14 @@ def read_effects(effects) -> tuple:
 
 
 def build_all(places: Places, name: str, tables, known: tuple[type, ...]) -> list:
-    """The objects of a list of tables."""
+    """Make the objects of the list `name` from their `tables`; `known` are the classes that it may hold."""
     if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
         raise places.error(None, 0, name, f"{name} is {shown(tables)}; allowed are tables [[{name}]]")
     return [build(places, name, k, table, known) for k, table in enumerate(tables)]
 
 
 def build(places: Places, name: str, index: int, table: Mapping[str, Any], known: tuple[type, ...]):
-    """The object of one table of the list `name`.
+    """Make the object of one table of the list `name`.
 
     Raises
     ------

@@ -14,27 +14,27 @@ HEADER = re.compile(r"\s*\[\[?\s*[A-Za-z_\"'][^,]*\]\s*(#.*)?$")
 
 
 class Places:
-    """Places in a scene's plain data, for errors: names of lists and tables, and indices.
+    """Places in a scene's plain data, for errors: the names of lists and tables, and indices.
 
     Parameters
     ----------
     source : str
-        Name of the data in messages; "": nothing stands in front.
+        Name of the data in messages; "": messages do not name it.
     """
 
     def __init__(self, source: str = ""):
         self._source = source
 
     def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table number `index` of the list `name`, or of the head (None)."""
+        """Make an error about a key of the table number `index` of the list `name`, or of the head (None)."""
         return self._told(message if name is None else f"{name}[{index}]: {message}")
 
     def error_in_table(self, name: str, key: str | None, message: str) -> ValueError:
-        """An error about a key of the table `name`, such as ``environment.goal``, or about the table."""
+        """Make an error about a key of the table `name`, such as ``environment.goal``, or about the table."""
         return self._told(f"{name}: {message}")
 
     def error_of_scene(self, lists: dict[str, list], message: str) -> ValueError:
-        """An error about the whole scene."""
+        """Make an error about the whole scene."""
         return self._told(message)
 
     def _told(self, message: str) -> ValueError:

@@ -47,7 +47,7 @@ class SceneFile:
     scene : Scene
         Scene of the file.
     others : dict of str to dict
-        Tables of `OTHERS` that the file has, with what stands in them, unchecked.
+        Tables of `OTHERS` that the file has, with their unchecked contents.
     places : Places
         Lines of the file, for errors about these tables.
     """
@@ -143,7 +143,7 @@ def file_from_toml(text: str, source: str = "scene", kinds: Sequence[type[Field]
 
 
 def file_from_content(content: Mapping[str, Any], places: Places, kinds: Sequence[type[Field]] = ()) -> SceneFile:
-    """Read all of a scene file's content, plain data; `places` makes the errors about it."""
+    """Make the scene and the other tables from the plain data of a scene file; `places` makes the errors about it."""
     _check_head(places, content)
     known = {**KINDS, "effects": (*KINDS["effects"], *kinds)}
     lists = {name: build_all(places, name, content.get(name, []), known[name]) for name in KINDS}

@@ -80,7 +80,7 @@ def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf
 
 
 class FoundContact(NamedTuple):
-    """Contact of a model in a scene's terms: its effects, and the frictions that its parts have of their own."""
+    """Contact properties of a model as a scene has them: effects, and friction coefficients of single surfaces."""
 
     effects: list[Any]
     bodies: list[float | None]
@@ -94,7 +94,7 @@ def find_contact(
     friction_of: FrictionOf = dynamic_friction,
     ends: Sequence[int] | None = None,
 ) -> FoundContact:
-    """Find the effects `Contact` and `Friction` of a scene, none if nothing touches, and the frictions of its parts.
+    """Find the effects `Contact` and `Friction` of a scene, if anything touches, and the frictions of single surfaces.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def find_contact(
 
 
 def _exceptions(bodies, still, meet_bodies: bool, friction_of: FrictionOf) -> list[tuple[int, int, float]]:
-    """Pairs (end, end, friction) that touch with another friction than the larger of their surfaces.
+    """Pairs (end, end, friction) that touch and whose friction is not the larger one of their surfaces.
 
     `bodies` and `still` hold an end and a surface each. A plane that only some bodies touch, or a pair of bodies that
     pass through each other, keeps the larger one.

@@ -1,7 +1,7 @@
-"""Friction of a scene's bodies and walls as MJCF has it: a number per geom, of which a pair has the larger, and pairs.
+"""Friction of a scene in the form of MJCF: a coefficient for each geom, and exceptions for pairs of geoms.
 
-MuJoCo knows no other rule than the maximum. So the pairs for which a scene's rule gives another number are written as
-``<pair>`` elements, which replace the numbers of their geoms.
+MuJoCo gives a pair the larger coefficient of its geoms. If a scene's rule gives a pair another coefficient, the pair is
+written as a ``<pair>`` element, whose coefficient replaces those of the geoms.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ class Frictions:
     Attributes
     ----------
     bodies, walls : list of float
-        Coefficient of each geom. A wall without one has the least of all bodies, which is never the larger one.
+        Coefficient of each geom. A wall without a coefficient of its own has the least coefficient of all bodies, so
+        that the body's coefficient decides.
     """
 
     def __init__(self, scene: Scene):
@@ -51,7 +52,7 @@ class Frictions:
         return float(plain_function(combine)(RULES.index(self._materials.rules[0]), own, theirs))
 
     def exceptions(self) -> Iterator[tuple[int, int, float]]:
-        """Iterate over pairs that touch with another coefficient than the larger one of their geoms.
+        """Iterate over pairs that touch and whose coefficient is not the larger one of their geoms.
 
         Items are (body, other body or -1 - wall, coefficient).
         """

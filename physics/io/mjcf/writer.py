@@ -88,7 +88,7 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
 
 
 def _check_names(scene: Scene) -> None:
-    """Raise a ValueError if a body or wall has the name that the file gives to another one, which has none."""
+    """Raise a ValueError if the name of a body or wall equals the name that the file gives to an unnamed one."""
     for kind, items, name_of in (("bodies", scene.bodies, unnamed), ("walls", scene.walls, unnamed_wall)):
         taken = {name_of(k): k for k, item in enumerate(items) if item.name is None}
         if kind == "walls":
@@ -102,7 +102,7 @@ def _check_names(scene: Scene) -> None:
 
 
 def _add_pairs(root: ET.Element, scene: Scene, pairs: list[tuple[int, int, float]]) -> None:
-    """Add the pairs (body, other body or -1 - wall, friction) that do not have the larger friction of their geoms."""
+    """Add the pairs (body, other body or -1 - wall, friction) whose friction is not the larger one of their geoms."""
     element = ET.SubElement(root, "contact")
     for body, other, mu in pairs:
         wall = -1 - other
