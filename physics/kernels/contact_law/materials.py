@@ -1,15 +1,15 @@
 """Materials: the coefficients of a contact, where a wall has coefficients of its own, or a pair is an exception.
 
-A body and a wall with coefficients of their own have those that a rule combines. At a wall without a coefficient those
-of the body act. An exception for a pair replaces both.
+A rule combines the coefficients of a body and of a wall that has its own. At a wall without coefficients those of the
+body act. An exception for a pair of body and wall replaces the result.
 
 Where walls have no coefficients, and no exception names a wall, nothing here is compiled: the numbers of the body act
 everywhere. Else the record of a body has members with its coefficients at each wall (`material_members`), which
 `bind_wall_coefficients` fills. If all walls have equal coefficients, a body has one number for all of them, and the
-kernels of contact read `body.mu` and `body.restitution` as ever. Only if walls differ, a member `walls_differ` makes
-them look at the wall of a contact.
+kernels of contact read `body.mu` and `body.restitution`, as in scenes without such walls. If walls differ, a member
+`walls_differ` of the record makes these kernels read the coefficients of the contact's wall.
 
-A wall is found by its number k. Whatever else stands still may follow behind the walls, with further numbers.
+A wall is found by its number k. Fixed bodies may follow behind the walls, with further numbers.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ WALL_COLUMNS = 4
 
 
 class WallMaterials(NamedTuple):
-    """Layout of the coefficients at walls: the members of a body's record that are not computed from step to step."""
+    """Layout of the coefficients at walls: the members of a body's record that stay the same in all steps."""
 
     walls: int  # number of walls
     differ: bool  # a body may have different coefficients at two walls
@@ -68,7 +68,10 @@ def _body(record):
 
 
 def _if_member(name: str, instead):
-    """Decorate a kernel that runs only if a body's record has this member; the last argument is record or workspace."""
+    """Decorate a kernel that runs only if a body's record has the member `name`; else `instead` is called or returned.
+
+    The last argument of the kernel is the record, or the workspace that contains it.
+    """
     return when(lambda *types: name in members(_body(types[-1])), instead)
 
 
@@ -180,7 +183,7 @@ def _always(slot, scratch):
 def may_hold(slot, scratch):
     """True if the contact in a slot may stick: where walls differ, one without friction only slides.
 
-    Its tangential forces would else be unknowns beside those of the contacts that can exert them.
+    Otherwise the tangential forces of a contact without friction would be unknowns, too.
     """
     return friction_of(slot, scratch) > 0.0
 

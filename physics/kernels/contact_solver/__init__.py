@@ -1,4 +1,4 @@
-"""Solvers of the contact problem of one body at walls: the problem, and what all solvers read, write and return.
+"""Solvers of the contact problem of one body at walls: the problem, and the input and output of all solvers.
 
 The problem
 -----------
@@ -64,7 +64,7 @@ the solver:
 
 Failure
 -------
-No solver raises an exception. A solver that fails tells so as follows, and `solve_contacts` goes on to the next one:
+No solver raises an exception. A solver reports its failure as follows, and `solve_contacts` then tries the next one:
 
 - A direct solver returns `found` False, and has changed neither `contacts.impulse` nor `stage.mode`.
 - Sweeps and Newton's method return a residual above their tolerance. Sweeps leave their last impulses, Newton's method

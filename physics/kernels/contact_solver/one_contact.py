@@ -147,7 +147,7 @@ def inverse_root(square):
 
 @inlined
 def is_warm_start_valid(push, needed):
-    """True if a warm start belongs to the present loads, so that its friction can be used.
+    """True if a warm start fits the present loads, so that its friction can be used.
 
     `push` is the sum of its normal impulses, and `needed` that under the present loads, in the same unit.
     """

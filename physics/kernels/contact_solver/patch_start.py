@@ -21,7 +21,7 @@ _MIN_SLIP_SHARE = 0.01
 
 @inlined
 def warm_start_motion(n, patch, on, body, scratch):
-    """Planar motion (v_a, v_b, ω_n) after the warm-start impulses, and whether these belong to the present loads.
+    """Planar motion (v_a, v_b, ω_n) after the warm-start impulses, and whether the warm start fits the loads.
 
     `on` is 1 in the lanes of the n contacts, 0 in a surplus lane.
     """

@@ -135,7 +135,7 @@ def _apply_impulses(n, width, v, L, scratch):
 
 @kernel
 def _solve_sticking(n, R, v, L, scratch):
-    """Call `solve_all_sticking`, as a kernel that is compiled once for the two calls in `_solve_directly`."""
+    """Call `solve_all_sticking`; as a kernel of its own it is compiled once for both calls in `_solve_directly`."""
     return solve_all_sticking(n, R, v, L, scratch)
 
 

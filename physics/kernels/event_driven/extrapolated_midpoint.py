@@ -282,7 +282,7 @@ def _begin_slide(P, offset_frame, scratch, motion):
 def _set_slip_turn_rate(offset_frame, scratch, motion):
     """Set `slip_turn_rate`, the rate at which the slip direction of the only contact turns [rad/s].
 
-    It follows from the direction at a state a moment after the start of the step.
+    It is computed from the slip direction at a state shortly after the start of the step.
     """
     contacts, pace, smooth = motion.contacts, motion.pace, motion.smooth
     d = row_vector(contacts.slip_direction, 0, 0)

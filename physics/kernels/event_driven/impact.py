@@ -42,10 +42,9 @@ _ALL_AT_ONCE = -1
 def rebound_target(speed, e, normal, r, rate, w, alpha, body, motion):
     """Target normal velocity of a contact that approaches with `speed` [m/s] in an impact; e is its restitution.
 
-    A contact rebounds at e times its speed, unless this is below `thresholds.rest_speed`, which counts as zero. A
-    leaving contact (speed < 0) may be
-    reversed, to approach at e times its speed and collide next. If it were only stopped, its impulse would do work on
-    it, and the energy would grow.
+    A contact rebounds at e times its speed. A rebound below `thresholds.rest_speed` counts as zero. A leaving contact
+    (speed < 0) may be reversed: it then approaches at e times its speed, and collides next. If it were only stopped,
+    its impulse would do work on it, and the energy would grow.
 
     Bounces too low to be made are left out, and their time is stored in `pace.skipped_bounce_time`. With the free
     acceleration b towards the wall a bounce takes t = 2 e speed / b, and it and all that follow take t/(1 - e). r and

@@ -32,9 +32,9 @@ def clamp_command(command, limit_force, limit_torque):
 def apply_actuator_lag(command, gone, kept, share, is_first, output, applied):
     """Let the wrench `output` follow the constant wrench `command` for some time, both (rows, 6) [N, N m].
 
-    By the end of the time the share `gone` of the difference has vanished. In the mean over the time, the share `kept`
-    of the difference at the start is still there. This mean, times `share`, is added to `applied` (rows, 6), or written
-    to it if `is_first`.
+    At the end of the time, the share `gone` of the initial difference between `command` and `output` has vanished. On
+    average over the time, the share `kept` of this difference remains. The mean of `output`, times `share`, is added to
+    `applied` (rows, 6), or written to it if `is_first`.
     """
     for i in range(command.shape[0]):
         for c in range(6):

@@ -75,7 +75,7 @@ def energy_gain(y, end, h, offset_frame, body):
 
 @if_declared(False)
 def has_work_error(y, end, h, offset_frame, body):
-    """True if loads in the middle of a stage from y to `end` do not do the work that the fields' energy loses.
+    """True if the work of the loads in a stage's middle differs from the loss of the fields' potential energy.
 
     h is the length of the stage; the difference must be more than WORK_ERROR_SHARE of the kinetic energy.
     """

@@ -78,7 +78,7 @@ def term_members(terms: tuple[Term, ...]) -> list[tuple]:
         ("held_torque", float, (3,)),  # of the wrench [N m]
         ("call_start", float),  # time at the start of the call [s]
         ("now", float),  # of the stage [s]
-        ("is_felt", int),  # 1: some field was not zero since this was set to 0
+        ("is_felt", int),  # 1: some field was nonzero since this flag was cleared
         ("is_textbook", int),  # 1: a textbook scheme moves the body
         ("is_stiff", int),  # 1: loads of the stage are those of an implicit step (`implicit_loads`)
         ("is_coarse", int),  # 1: a field was not resolved by some stage of this call

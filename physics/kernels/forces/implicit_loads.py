@@ -14,8 +14,8 @@ has the weight h²/4, the implicit midpoint rule, which keeps a quadratic energy
 This is of second order while h resolves the rate λ, and monotone beyond, towards implicit Euler. Several fields soften
 the loads one after the other: Π (1 + M⁻¹ Z_i)⁻¹ differs from (1 + M⁻¹ Σ Z_i)⁻¹ by O(h²), and damps no less.
 
-A field tells how stiff it is by three rates: damping λ [1/s], a squared frequency Ω² [1/s²], and the rate γ [1/s] at
-which it turns the velocity. Each is an upper bound, for one body alone. The function `<field>_rates` of each field
+The stiffness of a field is given by three rates: damping λ [1/s], a squared frequency Ω² [1/s²], and the rate γ [1/s]
+at which it turns the velocity. Each is an upper bound, for one body alone. The function `<field>_rates` of each field
 returns (λ, Ω², γ), and `soften_<field>` returns softened loads (a, T): acceleration [m/s²] and torque [N m].
 
 References

@@ -91,8 +91,9 @@ def _change_by_kick(kick, moved, v, L, place, body):
 def _is_too_much(change, size, cause, cause_size, body):
     """True if a change of loads is too large for the explicit midpoint rule.
 
-    `cause` are the loads whose kick has changed them, both as (acceleration, torque), and `size` and `cause_size` bound
-    the acceleration of any point by each [m/s²]. A change that opposes its cause may be twice as large as another.
+    `cause` are the loads whose kick made the change; both are pairs (acceleration, torque). `size` and `cause_size`
+    bound the acceleration of any point of the body by each of them [m/s²]. A change that opposes its cause may be twice
+    as large as another.
     """
     arm = body.radius * max(body.J[0], body.J[1], body.J[2])
     product = qt.dot(cause[0], change[0]) + arm * arm * qt.dot(cause[1], change[1])

@@ -94,7 +94,7 @@ def _gain_of(b, h, offset_frame, bodies):
 def _common_velocities(ties, bodies):
     """Velocity of the common centre of mass, now and at the start of the stage [m/s].
 
-    Both are zero if `ties` is 0, that is if other things than the bodies, such as walls, hold them.
+    Both are zero if `ties` is 0: then walls or anchors also hold the bodies.
     """
     mass, p, start = 0.0, ZERO, ZERO
     for b in range(bodies.body.shape[0]):

@@ -48,10 +48,10 @@ def free_gap_acceleration(slot, y, offset_frame, scratch):
 
 @cold_kernel
 def is_still_pressed(gap, slot, y, h, offset_frame, memory, scratch):
-    """True if an ellipsoid had a contact force in a memory slot in the last stage, and will be in contact again.
+    """True if an ellipsoid pushed in a contact slot in the last stage, and its motion brings it back to the wall.
 
-    In contact means that its gap to the wall is at most the slop within the time h [s], moved by its loads and its spin
-    from the gap now, `gap` [m]. `slot` is the slot of the wall in `memory`, y the state.
+    It is back at the wall if the gap becomes at most the slop within the time h [s]. The motion starts from the present
+    `gap` [m], under the body's loads and spin. `slot` is the slot of the contact in `memory`, and y the state.
     """
     if not (scratch.body.shape == ELLIPSOID and last_normal_impulse(slot, memory, scratch) > 0.0):
         return False

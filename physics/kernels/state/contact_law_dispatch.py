@@ -1,9 +1,10 @@
 """Contact laws beyond Coulomb's, which only some scenes declare: choose kernels by the type of a body's record.
 
-Where a scene declares rolling friction, the record of a body has a member `law_rolling`, likewise for the other laws.
-The member holds no value that is read; its name tells the compiler that the law is declared. The laws' coefficients of
-the body are in `body.laws`. A kernel that depends on a law is compiled for each type of the record. Where a law is not
-declared, nothing of it is compiled, stored or passed on. Force fields do likewise (`force_field_dispatch`).
+If a scene declares rolling friction, the record of a body has a member `law_rolling`; the other laws have members of
+the same kind. The value of the member is not used; its name tells the compiler that the law is declared. The laws'
+coefficients of the body are in `body.laws`. A kernel that depends on a law is compiled for each type of the record.
+Where a law is not declared, nothing of it is compiled, stored or passed on. Force fields use the same method
+(`force_field_dispatch`).
 """
 
 from __future__ import annotations

@@ -271,7 +271,7 @@ def substep(y, start, h, contact, flight, records, scratch):
 def _clear_substeps(y, clear, h, left, contact, memory, scratch):
     """Number of the next substeps in which the body cannot meet a wall, at most `left`; 0 if it may in the next one.
 
-    `clear` is the number found before, less the substeps since; it is returned as long as it is positive.
+    `clear` is the number found earlier, minus the substeps taken since. It is returned while it is positive.
     """
     if clear > 0 or has_touched(memory, scratch.body.i):
         return clear

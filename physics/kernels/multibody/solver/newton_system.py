@@ -100,25 +100,25 @@ def _world_rows(D, E, weight):
 
 @inlined
 def _sum(a):
-    """Sum of the vectors of a batch over its contacts, as half a column of `block_lu`."""
+    """Sum of the vectors of a batch over its contacts, as half a column of a block of `block_lu`."""
     return lane_sums(a[0], a[1], a[2], Lanes(0.0, 0.0, 0.0, 0.0))
 
 
 @inlined
 def _columns(x, y, z):
-    """Three columns of the matrix whose rows are x, y and z, for all contacts of a batch."""
+    """Columns of the 3 x 3 matrix with the rows x, y and z, for all contacts of a batch."""
     return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
 
 @inlined
 def _sum_columns(A):
-    """Sums over the contacts of a batch of three columns A, as halves of `block_lu`."""
+    """Sum of each of three columns A over the contacts of a batch, as half columns of `block_lu`."""
     return _sum(A[0]), _sum(A[1]), _sum(A[2])
 
 
 @inlined
 def _moment_columns(r, A):
-    """Sums over the contacts of a batch of r x each of three columns A, as halves of `block_lu`."""
+    """Sum of r x a over the contacts of a batch, for each of three columns a of A, as half columns of `block_lu`."""
     return _sum(qt.cross(r, A[0])), _sum(qt.cross(r, A[1])), _sum(qt.cross(r, A[2]))
 
 

@@ -1,8 +1,7 @@
 """Newton's method on the twists of all bodies of an island, in a proximal-point iteration.
 
-It serves problems on which sweeps converge slowly, and does for several bodies what
-`physics.kernels.contact_solver.proximal_newton` does for one. Let x be the change of all twists, q impulses near the
-solution, and ρ a penalty. For each contact let
+It serves problems on which sweeps converge slowly. `physics.kernels.contact_solver.proximal_newton` is the same method
+for one body. Let x be the change of all twists, q impulses near the solution, and ρ a penalty. For each contact let
 
     p(x) = proj(q - ρ u(x)),    u(x) = J x + b,
 

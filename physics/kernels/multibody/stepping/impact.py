@@ -213,7 +213,7 @@ def _extend_impact(n, h, fastest, many):
 
 @inlined
 def drop_unconstrained(n, many):
-    """Remove the unconstrained contacts from the set of n contacts; return how many are left.
+    """Remove the unconstrained contacts from the set of n contacts; return the number of remaining ones.
 
     An unconstrained contact has the target -`_UNCONSTRAINED`. It does not close in this stage.
     """

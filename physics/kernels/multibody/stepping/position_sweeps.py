@@ -23,7 +23,7 @@ _NOT_ASSEMBLED = 0.0
 
 @inlined
 def _clear_displacements(n, many):
-    """Clear the displacements, and flag the contacts with a target above 0 (of the n in the set) for a visit."""
+    """Clear the displacements; flag those of the n contacts whose target is above 0, so that they are visited."""
     for b in range(many.bodies.state.shape[0]):
         many.sweeps.pushed[b] = 0
         put_padded(many.sweeps.motion, b, 0, (0.0, 0.0, 0.0))
