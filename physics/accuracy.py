@@ -128,7 +128,7 @@ AccuracyArgument = Preset | Accuracy | Mapping[str, Any]
 
 
 def resolve(accuracy: AccuracyArgument, field: str = "accuracy") -> Accuracy:
-    """Return `accuracy` itself if it is an `Accuracy`, else that of a preset's name or of a mapping of settings.
+    """Make an `Accuracy` from a preset's name or from a mapping of settings; an `Accuracy` is returned unchanged.
 
     Any other value is a ValueError, whose message calls the argument `field` and lists the presets.
     """

@@ -20,7 +20,7 @@ def load_optional(module: str, purpose: str) -> ModuleType:
     Parameters
     ----------
     module : str
-        Such as ``pandas`` or ``matplotlib.figure``.
+        Name of the module, such as ``pandas`` or ``matplotlib.figure``.
     purpose : str
         Subject of the error's sentence, such as "a plot" in "a plot needs matplotlib".
 

@@ -14,7 +14,7 @@ UNKNOWN = "0+unknown"
 
 @cache
 def version() -> str:
-    """Version of the distribution `NAME`: that of pyproject.toml beside this package, else of the installed one.
+    """Return the version of the distribution `NAME`: that of the source tree if there is one, else the installed one.
 
     If Python runs from a source tree, another version may be installed; so pyproject.toml comes first. `UNKNOWN` is
     returned where neither is found.

@@ -94,7 +94,7 @@ def has_restitution(scene: Scene) -> bool:
 
 
 def check_materials(scene: Scene) -> None:
-    """Raise a ValueError for a coefficient without the effect that it belongs to, or for a pair that is not there."""
+    """Raise a ValueError for a coefficient without its effect, or for a pair that the scene does not have."""
     friction, contact = scene.effect(Friction), scene.effect(Contact)
     for name, items in (("bodies", scene.bodies), ("walls", scene.walls)):
         for k, item in enumerate(items):

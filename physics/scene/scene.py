@@ -112,7 +112,7 @@ def corner() -> list[HalfSpace]:
 @known_keywords
 @dataclass(frozen=True)
 class Scene:
-    """Immutable description of what is simulated: bodies, walls and effects.
+    """Immutable description of a simulation: bodies, walls and effects.
 
     Parameters
     ----------

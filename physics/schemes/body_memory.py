@@ -20,14 +20,14 @@ from physics.schemes.contacts import EVERY_BODY, Contacts, Strongest, keep_stron
 
 @kernel
 def _ends(i, k, memory):
-    """First column of contact `k` of world `i`, its first body, and its second body or -1 - wall."""
+    """Read the ends of contact `k` of world `i`: (its first column, first body, second body or -1 - wall)."""
     row = many.WARM_HEADER_SIZE + many.WARM_CONTACT_SIZE * k
     return row, int(memory[i, row + many.WARM_BODY_A]), int(memory[i, row + many.WARM_BODY_B])
 
 
 @kernel
 def _choose(world, body, memory, strongest):
-    """Choose the strongest contacts of a world, or of a `body` in it; return how many were chosen, and of how many.
+    """Choose the strongest contacts of a world, or of a `body` in it: (number chosen, number of all contacts).
 
     The chosen contacts are written into `strongest`.
     """

@@ -195,7 +195,7 @@ class Scheme(ABC):
         return None
 
     def acting(self, accuracy: Accuracy) -> Accuracy:
-        """Accuracy with which the scheme really steps, for schemes that raise tolerances to least values."""
+        """Accuracy with which the scheme steps; some schemes raise tolerances to least values of their own."""
         return accuracy
 
     @abstractmethod

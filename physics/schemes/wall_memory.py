@@ -77,7 +77,7 @@ class WallArrays(NamedTuple):
 
 @kernel
 def _choose(world, body, arrays, strongest):
-    """Choose the strongest contacts of a world, or of a `body` in it; return how many were chosen, and of how many.
+    """Choose the strongest contacts of a world, or of a `body` in it: (number chosen, number of all contacts).
 
     The chosen contacts are written into `strongest`.
     """

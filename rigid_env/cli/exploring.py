@@ -98,7 +98,7 @@ def _lacks_pictures() -> str:
 
 
 def _simulate(name: str, scene: Scene, duration: float, accuracy: str, dt: float, console: Console) -> Demo:
-    """Simulate a scene and print what happened; returns the run."""
+    """Simulate a scene, and print its events and energies; returns the run."""
     from rigid_env.lab.demo import Demo
     from rigid_env.lab.demo_report import show
 

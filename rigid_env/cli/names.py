@@ -1,4 +1,4 @@
-"""Names that a user types in a shell, such as scenes and presets: find what they mean, and complete them."""
+"""Names that a user types in a shell, such as scenes and presets: look them up, and complete them."""
 
 from __future__ import annotations
 

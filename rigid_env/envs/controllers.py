@@ -109,7 +109,7 @@ def reorient_controller(observations: np.ndarray) -> np.ndarray:
 
 
 def pushers_controller(observations: np.ndarray) -> np.ndarray:
-    """Control both agents of TwoPushers: each does what one agent of twice the strength would do.
+    """Control both agents of TwoPushers: each of them acts like the single agent of BlockReach.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Find an environment by what a user types: an id, or a task class, also in the working folder."""
+"""Find an environment by a user's input: an id, or a task class, also of a module in the working folder."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def not_there(name: str, field: str = "env", why: object = "", others: Iterable[
 
 
 def make_named(name: str, field: str = "env", others: Iterable[str] = ()) -> gym.Env:
-    """Make the environment that a user names.
+    """Make the environment of a user's input.
 
     Parameters
     ----------

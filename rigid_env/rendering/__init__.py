@@ -1,4 +1,4 @@
-"""Software rendering of a scene: a `Frame` has what to draw, and a `Renderer` turns it into pixels.
+"""Software rendering of a scene: a `Frame` has the contents of a picture, and a `Renderer` turns them into pixels.
 
 These classes do not depend on the physics engine or on Gymnasium: frames are made of plain arrays. pygame is imported
 when a `Renderer` is made. `rendering.picture` makes frames of a `physics.World`, and `rendering.pixels` makes pixel

@@ -27,7 +27,7 @@ class Canvas:
         `SUPERSAMPLING` times as large as the picture.
     camera : Camera
     pygame : module
-        With `gfxdraw` imported.
+        The module pygame, with its submodule `gfxdraw` imported.
     """
 
     def __init__(self, surface, camera, pygame):

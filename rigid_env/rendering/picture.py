@@ -108,7 +108,7 @@ def stroboscope(pictures: Sequence[np.ndarray], empty: np.ndarray) -> np.ndarray
     Parameters
     ----------
     pictures : sequence of (height, width, 3) uint8
-        In order of time, at least one.
+        Pictures in order of time, at least one.
     empty : (height, width, 3) uint8
         Picture of the same scene without the moving bodies.
 

@@ -128,7 +128,7 @@ class ShadowLayer:
         camera : Camera
         walls : list of LitWall
         frame : Frame
-            With at least one body.
+            Frame with at least one body.
         """
         groups = outlines(frame)
         self._total.fill(0)

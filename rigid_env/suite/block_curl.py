@@ -28,13 +28,13 @@ class Ring(Distribution):
     length, uniforms = 2, 2
 
     def at(self, shares, drawn):
-        """Places (n, 2) of uniform numbers (n, 2)."""
+        """Convert uniform numbers (n, 2) to places (n, 2) [m]."""
         radius = np.sqrt(NEAREST**2 + (FARTHEST**2 - NEAREST**2) * shares[:, 0])
         angle = 2.0 * np.pi * shares[:, 1]
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
     def describe(self):
-        """Text for tables."""
+        """Description of the distribution for tables."""
         return f"on a ring from {NEAREST:g} to {FARTHEST:g} m about the start"
 
 

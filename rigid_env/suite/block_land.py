@@ -41,13 +41,13 @@ class Attitude(Distribution):
     length, uniforms = 4, 3
 
     def at(self, shares, drawn):
-        """Quaternions (n, 4) of uniform numbers (n, 3)."""
+        """Convert uniform numbers (n, 3) to quaternions (n, 4)."""
         low, high = np.sqrt(1.0 - shares[:, 0]), np.sqrt(shares[:, 0])
         first, second = 2.0 * np.pi * shares[:, 1], 2.0 * np.pi * shares[:, 2]
         return np.stack([low * np.sin(first), low * np.cos(first), high * np.sin(second), high * np.cos(second)], 1)
 
     def describe(self):
-        """Text for tables."""
+        """Description of the distribution for tables."""
         return "uniform over all rotations"
 
 

@@ -21,7 +21,8 @@ class TwoPushers(BlockReach):
 
     ## Rewards
 
-    As of BlockReach, shared: the gain of a potential, minus costs of the actions of both, plus a bonus for success.
+    Both agents get the reward of BlockReach: the gain of a potential, minus costs of both actions, plus a bonus for
+    success.
 
     ## Starting State
 

@@ -1,4 +1,4 @@
-"""Starts of a task's episodes: draw values, place the bodies, and update what depends on their parameters."""
+"""Starts of a task's episodes: draw values, place the bodies, and update quantities that depend on parameters."""
 
 from __future__ import annotations
 

@@ -316,7 +316,7 @@ class Task(Starts):
         self.clock += 1
 
     def _prepare(self) -> None:
-        """Make what cannot be pickled: kernels bound to this process's arrays, and the dict of arrays for states."""
+        """Make the objects that cannot be pickled: kernels bound to arrays, and the dict of arrays for states."""
         table, advance = self._table, self._advance
         self.wrench_arguments = (
             self.action, table.table, table.points, self.limits, self.world.state, advance.wrench, advance.kick

@@ -216,7 +216,7 @@ def put_chain(env: gym.Env, chain: Chain, is_other: bool = False) -> None:
 
 
 def _rehearsed(env: gym.Env) -> Callable[[], None]:
-    """Make a function that compiles what an environment calls, by running one step of an episode."""
+    """Make a function that compiles the kernels of an environment, by running one step of an episode."""
 
     def work() -> None:
         env.reset(seed=0)

@@ -183,5 +183,5 @@ class Subject:
         return {}
 
     def rehearsal(self) -> Callable[[], None] | None:
-        """Function that compiles what a step needs, and may run in another thread; None: nothing to compile."""
+        """Function that compiles the kernels of a step, and may run in another thread; None: nothing to compile."""
         return None

@@ -101,7 +101,7 @@ def _refuse(name: str, why: str, **given: Any) -> None:
 
 
 def _loaded(what: Any) -> tuple[Any, str]:
-    """Load what a name or path means; returns an object or an environment's id, and a title. Objects stay."""
+    """Load the object of a name or path: (object or environment's id, title). Objects are returned unchanged."""
     if isinstance(what, (str, os.PathLike)):
         return _of_text(os.fspath(what))
     known = (physics.Scene, physics.World, physics.Trajectory, physics.Recording)

@@ -40,7 +40,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Shown:
-    """Choice of what is printed with the points of a measurement.
+    """Choice of the output that is printed for the points of a measurement.
 
     Parameters
     ----------

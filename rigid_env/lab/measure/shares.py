@@ -134,7 +134,7 @@ def measure(
     Returns
     -------
     list of Share
-        In the order of `scene.effects`.
+        Shares in the order of `scene.effects`.
 
     Raises
     ------

@@ -98,7 +98,7 @@ class Starts:
     Attributes
     ----------
     pos, quat, linvel, angvel : (tosses, 3|4|3|3) float64
-        In true lengths [m, -, m/s, rad/s].
+        States in true lengths [m, -, m/s, rad/s].
     """
 
     pos: np.ndarray
