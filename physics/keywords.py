@@ -66,7 +66,7 @@ def known_keywords(target: Function) -> Function:
 
 
 def _checked(function: Callable, name: str, first: int = 0) -> Callable:
-    """Wrap `function` with a check of its keywords; errors call it `name`.
+    """Wrap `function` with a check of its keywords; `name` names the function in errors.
 
     The first `first` parameters, such as `self`, are not listed as keywords.
     """

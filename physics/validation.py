@@ -80,7 +80,7 @@ def _is_real(item) -> bool:
 
 
 def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array, which must have exactly this `shape`; an error calls it `field`."""
+    """Convert `value` to a float64 array, which must have exactly this `shape`; errors name it `field`."""
     array = floats(value, field, f"are numbers in shape {shape}" if shape else "is one number")
     if array.shape != shape:
         allowed = f"shape {shape}" if shape else "one number"
@@ -89,7 +89,7 @@ def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def finite(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of exactly this `shape` with finite numbers; an error calls it `field`."""
+    """Convert `value` to a float64 array of exactly this `shape` with finite numbers; errors name it `field`."""
     array = shaped(value, shape, field)
     if not np.isfinite(array).all():
         raise _not_finite(array, field)
@@ -129,7 +129,7 @@ def _given(array: np.ndarray) -> str:
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
     """Copy `value` into `target`, a contiguous float64 array (worlds, bodies, n), and check that it is finite.
 
-    `value` may have all shapes that `batch` allows; an error calls it `field`, and leaves `target` overwritten. Copy
+    `value` may have all shapes that `batch` allows; errors name it `field`, and leaves `target` overwritten. Copy
     and check take one pass, since every step makes this call.
     """
     if type(value) is np.ndarray and value.shape == target.shape and value.dtype.kind in "fiu":
@@ -162,7 +162,7 @@ def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> Value
 
 
 def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
-    """Convert `value` to a finite float64 array (n, `width`) with any number n of rows; an error calls it `field`."""
+    """Convert `value` to a finite float64 array (n, `width`) with any number n of rows; errors name it `field`."""
     array = floats(value, field, f"are rows of {width} numbers")
     if array.ndim != 2 or array.shape[1] != width:
         raise ValueError(f"{field} {_given(array)}; allowed are rows of {width} numbers")
@@ -170,12 +170,12 @@ def rows(value: ArrayLike, width: int, field: str) -> np.ndarray:
 
 
 def number(value: ArrayLike, field: str) -> float:
-    """Convert `value` to a float, which must be finite; an error calls it `field`."""
+    """Convert `value` to a float, which must be finite; errors name it `field`."""
     return float(finite(value, (), field))
 
 
 def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape` with finite numbers above 0; an error calls it `field`."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers above 0; errors name it `field`."""
     array = finite(value, shape, field)
     if not (array > 0).all():
         raise _bad(array, array > 0, field, "are numbers greater than 0")
@@ -183,7 +183,7 @@ def positive(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray
 
 
 def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape` with finite numbers from 0 on; an error calls it `field`."""
+    """Convert `value` to a float64 array of this `shape` with finite numbers from 0 on; errors name it `field`."""
     array = finite(value, shape, field)
     if not (array >= 0).all():
         raise _bad(array, array >= 0, field, "are numbers of at least 0")
@@ -191,7 +191,7 @@ def non_negative(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.nda
 
 
 def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
-    """Convert `value` to a float64 array of this `shape` with numbers from 0 to 1; an error calls it `field`."""
+    """Convert `value` to a float64 array of this `shape` with numbers from 0 to 1; errors name it `field`."""
     array = finite(value, shape, field)
     good = (array >= 0) & (array <= 1)
     if not good.all():
@@ -200,7 +200,7 @@ def share(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
 
 
 def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> int:
-    """Convert `value` to an int, which must be an integer from `least` to `most`; an error calls it `field`.
+    """Convert `value` to an int, which must be an integer from `least` to `most`; errors name it `field`.
 
     `most` None sets no upper limit.
     """
@@ -214,7 +214,7 @@ def count(value: int, field: str, least: int = 1, most: int | None = MOST) -> in
 
 
 def index(value: int, count: int, field: str) -> int:
-    """Convert `value` to an int, which must be an index from 0 to `count` - 1; an error calls it `field`."""
+    """Convert `value` to an int, which must be an index from 0 to `count` - 1; errors name it `field`."""
     is_integer = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not is_integer or not 0 <= value < count:
         raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}")
@@ -245,7 +245,7 @@ def instance(value: object, kind: type, field: str, name: str):
 
 
 def path(value: str | os.PathLike, field: str = "path"):
-    """Return `value`, which must be the path of a file: a str or a `Path`, not empty; an error calls it `field`."""
+    """Return `value`, which must be the path of a file: a str or a `Path`, not empty; errors name it `field`."""
     if not isinstance(value, (str, os.PathLike)) or not os.fspath(value):
         raise ValueError(f"{field} is {shown(value)}; allowed is the path of a file, a str or a Path")
     return value

@@ -138,6 +138,6 @@ def contact_events(before: Mapping[Pair, float], now: Mapping[Pair, float], t: f
 
 
 def fault_events(world: World, t: float) -> list[Event]:
-    """Make the ``fault`` event of the last step of world 0, a list of one or none; `t` is the end of the step [s]."""
+    """List with the ``fault`` event of world 0's last step, empty without a fault; `t` is the end of the step [s]."""
     report = world.report
     return [Event(t, "fault", int(report.fault_body[0]))] if report.faults[0] else []

@@ -16,7 +16,7 @@ __all__ = ["Team", "listed"]
 
 
 def listed(worlds: np.ndarray) -> np.ndarray:
-    """Make a list of taken worlds (TAKEN_FIRST_WORLD + n,) int64 from the indices `worlds` (n,), as threads keep it."""
+    """Make the list of taken worlds (TAKEN_FIRST_WORLD + n,) int64, which threads read, from indices `worlds` (n,)."""
     taken = np.zeros(at.TAKEN_FIRST_WORLD + len(worlds), dtype=np.int64)
     taken[at.TAKEN_COUNT], taken[at.TAKEN_FIRST_WORLD :] = len(worlds), worlds
     return taken

@@ -55,7 +55,7 @@ class Plan(Switches):
         return any(slot.may_raise for slot in self.fields)
 
     def allows(self, moments: np.ndarray, R: np.ndarray) -> np.ndarray:
-        """True for bodies with whose inertia the kernel of this plan can compute the rotation.
+        """True for bodies whose rotation the kernel of this plan can compute, by their inertia tensors.
 
         Parameters
         ----------

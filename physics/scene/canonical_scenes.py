@@ -194,7 +194,7 @@ def heap(count: int = 100, seed: int = 1) -> Scene:
 
 
 def football() -> Scene:
-    """The football of the course notes in flight: kicked at 25 m/s, spinning about its long axis and a little off it.
+    """The football of the course notes in flight: kicked at 25 m/s, spinning about an axis slightly off its long axis.
 
     Gravity exerts no torque on it. The air exerts drag and lift, and slowly brakes the spin.
     """

@@ -234,7 +234,7 @@ def _compiled(kind: type[Field], name: str) -> Any:
 
 
 def _name(kind: type[Field]) -> str:
-    """Name that identifies a kind of field: that of its function; for a user's field with the functions' digest."""
+    """Name that identifies a kind of field: its function's name; in a user's field also a digest of the functions."""
     function = _compiled(kind, "function")
     name = plain_function(function).__name__.replace("_", "")
     if _is_built_in(function):

@@ -25,7 +25,7 @@ PAIRS_ALLOWED = "allowed is a dict of two names to a number, as {('die', 'tray')
 
 
 def checked_rule(rule: Any, field: str) -> str:
-    """Check the name of a rule that combines two coefficients; an error calls it `field`."""
+    """Check the name of a rule that combines two coefficients; errors name it `field`."""
     if not isinstance(rule, str) or rule not in RULES:
         names = nearest_first(rule, RULES) if isinstance(rule, str) else RULES
         raise ValueError(f"{field} is {shown(rule)}; allowed are {', '.join(map(repr, names))}")

@@ -31,7 +31,7 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed ones; also for hulls at walls, and bodies tied by springs there.
+    """Scheme for bodies that touch each other or fixed bodies, and for hulls and spring-tied bodies at walls.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from physics.schemes.scheme import Switches
 
 
 def wall_materials(scene: Scene, switches: Switches, differ: bool | None = None) -> WallMaterials | None:
-    """Layout of a scene's coefficients at walls; None if those of a body act at all of them.
+    """Layout of a scene's coefficients at walls; None if each body has the same coefficients at all walls.
 
     `differ` tells whether the scheme looks at the wall of each contact; None: only if walls differ.
     """

@@ -112,7 +112,7 @@ class Switches:
 
     @property
     def columns(self) -> int:
-        """Number of columns of the parameter table behind those of all bodies: fields, coefficients at walls, laws."""
+        """Number of columns of the parameter table after a body's own: fields, wall coefficients and contact laws."""
         return self.field_columns + self.material_columns + len(self.laws)
 
     @property

@@ -42,7 +42,7 @@ def _impulse(i, slot, memory):
 
 @entry_kernel
 def copy_wall_memory(source, target):
-    """Copy the rows of one contact memory into another, but only the numbers of contacts; all others stay zero.
+    """Copy the rows of one contact memory into another, but touch only the numbers of contacts.
 
     A block in a box has room for 24 contacts and rests on four, so that most numbers of a row are zero. A snapshot of a
     thousand such rows is as large as the cache of a processor, and touching less memory saves time. Slots out of range,

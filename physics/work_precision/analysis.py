@@ -90,7 +90,7 @@ def _line(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def lost_from(steps: Sequence[float], is_lost: Sequence[bool]) -> float | None:
-    """Smallest step such that it and all larger steps are lost; None if the largest step is not lost."""
+    """Smallest step such that this step and all larger ones are lost; None if the largest step is not lost."""
     found = None
     for i in sorted(range(len(steps)), key=lambda i: -steps[i]):
         if not is_lost[i]:

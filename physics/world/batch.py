@@ -205,7 +205,7 @@ class Batch(Exclusive):
         return _KEPT(self) if self.plan.sleeping else _KEPT_AWAKE(self)
 
     def kept_rows(self) -> tuple[int, ...]:
-        """Rows of one world in each of the arrays `kept()`; 0 for an unused array, which has one row for all worlds."""
+        """Number of rows per world of each array in `kept()`; 0 for an unused array, which has one row in all."""
         bodies = self.body_count
         memory = self.plan.scheme.memory.rows_per_world(bodies) if self.plan.contact else 0
         return (bodies, bodies, 1, memory, 1, bodies) if self.plan.sleeping else (bodies, bodies, 1, memory, 1)

@@ -95,7 +95,7 @@ def _write_series(params: np.ndarray) -> None:
 
 @entry_kernel
 def _change_series(params):
-    """Write the coefficients of the attitude series as `_write_series` does, compiled, since resets may need it."""
+    """Do `_write_series` in a compiled kernel, which is fast enough for resets."""
     first = at.INV_INERTIA
     for i in range(params.shape[0]):
         series = params[i, at.SERIES : at.SERIES + at.SERIES_SIZE]

@@ -65,7 +65,7 @@ def largest_distance(value: float) -> float:
 
 
 def result(out: Any, kind: type, shapes: Mapping[str, tuple[int, ...]]) -> Any:
-    """Return `out`, a named tuple of the class `kind`, made if it is None; its arrays must have these shapes, by name.
+    """Check arrays of `out`, a named tuple of the class `kind`, against `shapes` by name, and return it; None makes it.
 
     `kind.INTEGERS` names the arrays of int64; all others are of float64.
     """

@@ -182,7 +182,7 @@ def _check_scene(world: Batch, snapshot: Snapshot) -> None:
 
 
 def _check_inertia(world: Batch, snapshot: Snapshot) -> None:
-    """Raise a ValueError if a snapshot's bodies need parts of the rotation for which the kernel is not compiled."""
+    """Raise a ValueError if the kernel of the scene cannot compute the rotation of a snapshot's bodies."""
     plan, rows = world.plan, snapshot.arrays[KEPT.index("params")]
     moving = rows[rows[:, at.INV_MASS] > 0.0]
     is_odd = not plan.gyroscopic and not is_isotropic(1.0 / moving[:, at.INV_INERTIA : at.INV_INERTIA + 3]).all()

@@ -25,7 +25,7 @@ class Follow(NamedTuple):
 
 
 class Course(NamedTuple):
-    """Wrenches of a rollout, and the array in which the step kernel finds that of the next step."""
+    """Wrenches of a rollout, and the array from which the step kernel reads the wrench of the next step."""
 
     wrenches: np.ndarray  # (worlds, length, bodies, 6) force [N], torque [N m]
     held: np.ndarray  # (rows, 6) wrench of the next step

@@ -60,7 +60,7 @@ def wrench_at(
 
 
 def _spread(value, shape: tuple[int, int, int], field: str) -> np.ndarray:
-    """Check that `value` is finite, and broadcast it to `shape` (worlds, bodies, 3); an error calls it `field`."""
+    """Check that `value` is finite, and broadcast it to `shape` (worlds, bodies, 3); errors name it `field`."""
     allowed = f"shape (3,), {shape[1:]} or {shape}"
     array = validation.floats(value, field, f"are numbers in {allowed}")
     if array.shape not in ((3,), shape[1:], shape):

@@ -15,14 +15,14 @@ from rigid_env.tasks import Task
 
 @dataclass(frozen=True)
 class TaskArgument:
-    """Argument for the task behind an environment."""
+    """Argument `task` of an environment: the task that it wraps."""
 
     task: Task
 
 
 @dataclass(frozen=True)
 class CountArgument:
-    """Argument for the number of worlds in a vector environment."""
+    """Argument `num_envs` of a vector environment: the number of its worlds."""
 
     num_envs: int = 1
 

@@ -107,7 +107,7 @@ class _Checks:
             self._starts_anew(mode, alone)
 
     def _starts_anew(self, mode: AutoresetMode, alone: list[_Episodes]) -> None:
-        """Check that episodes end at the limit, and restart as the mode says, like those of a single environment."""
+        """Check that episodes end at the limit, restart as `mode` says, and then match single environments."""
         is_late = mode is AutoresetMode.NEXT_STEP  # a world starts anew in the step after that in which it ended
         envs = self.batch(mode, self.limit)
         obs, _ = envs.reset(seed=SEED)
@@ -203,14 +203,14 @@ class _Episodes:
                 self.starts[k], count = env.reset(), 0
 
     def steps_as(self, k: int, theirs: tuple, mode: AutoresetMode) -> None:
-        """Check that step k equals that of the batch's world: observation, reward, end and truncation in `theirs`."""
+        """Check that step k equals the same step of the batch: observation, reward, end and truncation, in `theirs`."""
         if not self._has(k):
             return
         for what, ours, other in zip(("observation", "reward", "end", "truncation"), self.steps[k], theirs):
             _same(what, ours, other, self._where(k, mode))
 
     def starts_as(self, k: int, obs, infos: dict[str, Any], mode: AutoresetMode) -> None:
-        """Check that the start after step k equals that of the batch's world."""
+        """Check that the episode after step k starts as in the batch."""
         if not self._has(k):
             return
         ours, told = self.starts[k]

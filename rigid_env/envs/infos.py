@@ -18,7 +18,7 @@ ROWS = 256
 
 
 class InfoMaker:
-    """Maker of the info dict of a step or a start, from the row of an outcome and the status; see `info_maker`.
+    """Maker of the info dict of a step or a start, from its row of outcomes and its status; see `info_maker`.
 
     The drawn values stay the same from step to step: an info is a copy of a dict that holds them, and the other numbers
     are written into it. Gymnasium requires new arrays in each info. They are rows of tables with many copies, which
@@ -36,7 +36,7 @@ class InfoMaker:
         self.pattern: dict[str, Any] = {}
 
     def __call__(self, row: list[float], status: int) -> dict[str, Any]:
-        """Info dict of a step or a start, from the row of its outcome and its status."""
+        """Info dict of a step or a start, from its row of outcomes and its status."""
         raise NotImplementedError
 
     def tell(self) -> None:

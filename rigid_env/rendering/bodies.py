@@ -20,7 +20,7 @@ GOAL_OUTLINE_WIDTH = 2.2
 
 
 def body_colour(body, index):
-    """sRGB colour of a `BodyView` before shading: its own, or that of the palette for its index in the frame."""
+    """sRGB colour of a `BodyView` before shading: its own, or the palette's colour for its index in the frame."""
     return tuple(body.colour) if body.colour is not None else palette.BODIES[index % len(palette.BODIES)]
 
 

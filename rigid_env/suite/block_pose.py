@@ -83,11 +83,11 @@ class BlockPose(BlockTask):
 
     ## Description
 
-    The block of `BlockReach` in the same box, acted upon by the same force and torque, at 50 ms for a control step. A
-    pose on the floor is wanted: the place of the centre, the face that is down, and the heading. The face is not the
-    one at the start. The heading is the turn about the vertical, as `yaw` of a start. A heading that is half a turn off
-    is wrong, although the block looks the same. Tumbling onto the face also moves the block and turns it, so that each
-    of the three goals may undo another one.
+    The block, its box, and the force and torque on it are as in `BlockReach`. A control step takes 50 ms. The goal is a
+    pose on the floor: the place of the centre, the face that is down, and the heading. This face is not down at the
+    start. The heading is the turn about the vertical, as `yaw` of a start. A heading that is half a turn off is wrong,
+    although the block looks the same. Tumbling onto the face also moves the block and turns it, so that each of the
+    three goals may undo another one.
 
     ## Rewards
 

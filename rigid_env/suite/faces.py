@@ -16,7 +16,7 @@ HALF_EDGES = tuple(f"half edge along {which}" for which in ("normal", "next", "l
 
 
 def order_of(faces: np.ndarray) -> np.ndarray:
-    """Body axes (n, 3) int64 in the order that starts with the axis of a face.
+    """Body axes (n, 3) int64: the axis of a face, and the two axes that follow it cyclically.
 
     `faces` (n,) are 0 to 5 for -x, +x, -y, +y, -z, +z.
     """

@@ -39,9 +39,9 @@ def parameter_of(name: str) -> tuple[str, str | None] | None:
 
 
 def place_of(name: str, scene: Scene) -> int | None:
-    """Index of the body or wall that the name of a physical parameter means; None: all of them.
+    """Index of the body or wall that the name of a physical parameter refers to; None for all bodies or walls.
 
-    It is given by its index or its name.
+    The name contains the index or the name of that body or wall.
 
     Raises
     ------

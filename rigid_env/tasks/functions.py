@@ -53,7 +53,7 @@ class Functions:
         self.undo = StepUndo(task)
 
     def _rehearse(self) -> None:
-        """Call each function once in world 0, with drawn values, and restore the world; errors mention it."""
+        """Call each function once in world 0, with drawn values, and restore the world; errors name the rehearsal."""
         task = self.task
         world, kept = task.world.snapshot(), {name: array[0].copy() for name, array in task.drawn.items()}
         values = task.episodes.draw(np.zeros(1, dtype=np.int64), task.episodes.rehearsal(), {})
@@ -113,7 +113,7 @@ class Functions:
         task.outcome[rows], task.obs[rows] = outcome, obs
 
     def step(self, actions: np.ndarray) -> None:
-        """Advance all worlds by one control step, and observe them; after an error the task is as before."""
+        """Advance all worlds by one control step, and observe them; an error restores the task."""
         task = self.task
         task.given[...] = actions
         if not np.isfinite(task.given).all():

@@ -79,7 +79,7 @@ def wall_gaps(body: int = 0, walls: int = 3, scale: float = LENGTH, bound: float
 
 
 def lidar(body: int, directions: ArrayLike, max_distance: float, origin: ArrayLike = (0.0, 0.0, 0.0)) -> Entry:
-    """Distances along rays that a body carries, over `max_distance`: 1 where a ray hits nothing within it.
+    """Distances along rays fixed to a body, divided by `max_distance`: 1 where a ray hits nothing within it.
 
     Rays hit other bodies and walls, and pass through the body itself. `directions` (rays, 3), of any length but 0, and
     `origin` (3,), from the centre of mass [m], are in the frame of the body.

@@ -34,7 +34,7 @@ class Section:
         return key in self.values
 
     def error(self, key: str | None, message: str) -> ValueError:
-        """Make an error with a message about a key (None: about the table itself); it tells file and line."""
+        """Make an error about a key, or about the table if it is None; the message names file and line."""
         if self._places is not None:
             return self._places.error_in_table(self.name, key, message)
         return ValueError(f"{self.name}: {message}" if self.name else message)
@@ -59,7 +59,7 @@ class Section:
         return self.read(key, check)
 
     def part(self, key: str, allowed: Iterable[str]) -> Section:
-        """Table under a key of this table; an error if it is none, or has keys that are not in `allowed`."""
+        """Table under a key of this table. Raises if the value is no table, or has keys that are not in `allowed`."""
         name = f"{self.name}.{key}" if self.name else key
         values = self.values[key]
         if not isinstance(values, Mapping):

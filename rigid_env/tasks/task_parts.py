@@ -37,7 +37,7 @@ class Batched(Protocol):
 
 
 class Disturbed(Batched, Protocol):
-    """Part of a task that `Disturbances` use; they draw from its generators."""
+    """Part of a task that `Disturbances` use, including the generators from which they draw."""
 
     generators: list[Any]  # numpy.random.Generator; None before the first episode
 

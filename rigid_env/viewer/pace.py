@@ -39,7 +39,7 @@ class Pace:
         return self.due >= interval * (1.0 - ROUNDING)
 
     def leave_out(self, wanted: float) -> None:
-        """Drop the time that is still due; before the last steps `wanted` [s] were due."""
+        """Drop the time that is still due, out of the time `wanted` [s] that was due before the last steps."""
         self._note(1.0 - self.due / wanted)
         self.due = 0.0
 

@@ -100,7 +100,7 @@ class Run:
         self._sample()
 
     def _step(self, record: Any = None) -> Any:
-        """Take one step of the subject with the user's forces, a new one or that of a `record`; returns its record."""
+        """Take one step with the user's forces, or repeat the step of a `record`; returns the record of the step."""
         world = self.subject.world
         load = None if world is None else self.hand.load(world, self.subject.interval)
         record = self.subject.step(load, record)

@@ -148,7 +148,7 @@ class Session(Controls):
                 break
 
     def reset(self, seed: int | None = None) -> None:
-        """Begin the run anew, with the sliders as they are; an error of a user's function stands in `message` instead.
+        """Restart the run, and keep the sliders' values; if a user's function fails, `message` holds its error instead.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Session(Controls):
             self._run.give(name, value)
 
     def _take(self) -> bool:
-        """Take a step, and put a fault of it into the message; returns False if no step was taken."""
+        """Take one step, and show a fault of the step as the message; returns False if no step was taken."""
         if START in self._jobs:
             return False
         if self.subject.is_over:

@@ -191,7 +191,7 @@ def _policy(env, policy, controller):
 
 
 def _id_of(env) -> str:
-    """Id of an environment; the name of its task where it was made without one."""
+    """Id of an environment; if it has none, the name of its task's class."""
     return env.spec.id if env.spec is not None else type(env.unwrapped.task).__name__
 
 

@@ -116,7 +116,7 @@ class WorldSubject(Subject):
         return self.world.snapshot()
 
     def _put(self, state: Any, is_other: bool = False) -> None:
-        """Continue from a result of `_take`; `is_other`: it was taken at another accuracy."""
+        """Continue from a `state` that `_take` returned; `is_other` is true for a state of another accuracy."""
         self.world.restore(fitted(state, self.world) if is_other else state)
 
 

@@ -54,7 +54,7 @@ _ARGUMENT_MODELS: dict[int, tuple] = {}
 
 
 def _argument_model(model):
-    """Model of an argument, cached: `_ByAddress` if `model` is that of a large tuple, else `model` itself."""
+    """Model of an argument, cached: `_ByAddress` for a model of a large tuple, else `model` itself."""
     known = _ARGUMENT_MODELS.get(id(model))
     if known is None:
         known = _ARGUMENT_MODELS[id(model)] = model, _ByAddress(model) if _is_large(model) else model
@@ -77,7 +77,7 @@ class _ByAddress:
         return self._type.as_pointer()
 
     def as_argument(self, builder, value):
-        """Address to pass for a tuple: its own if it came by address, else that of a copy on the stack."""
+        """Address to pass for a tuple: the tuple's own if it has one, else the address of a copy on the stack."""
         if isinstance(value, StructInMemory):
             return value.address
         address = stack_slot(builder, self._type)

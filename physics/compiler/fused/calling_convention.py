@@ -84,7 +84,7 @@ class ValueCallConv(CPUCallConv):
             raise MayRaise(builder.function.name)
 
     def get_arguments(self, func):
-        """Arguments of an LLVM function that are those of the kernel, without Numba's for result and exception."""
+        """Arguments of a kernel in its LLVM function, without Numba's two in front for result and exception."""
         return func.args if returns_value(func) else super().get_arguments(func)
 
     def return_value(self, builder, retval):
@@ -110,7 +110,7 @@ class ValueCallConv(CPUCallConv):
         super().return_dynamic_user_exc(builder, *about, **more)
 
     def return_status_propagate(self, builder, status):
-        """Write the instructions that leave a function with the exception of a call, if `status` is that of one."""
+        """Write the instructions that leave a function if `status` says that a function it called raised an error."""
         if status.code is not RETCODE_OK:
             self.must_give_status(builder)
             super().return_status_propagate(builder, status)

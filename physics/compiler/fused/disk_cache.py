@@ -186,8 +186,8 @@ class SharedCache(_Cache):
 def register_library(target_context, about, environment, library):
     """Register a part or shared kernel with Numba, so that other kernels can call it; return its entry point.
 
-    Numba identifies compiled functions by their entry points. The one made here only serves this; it must not be
-    called.
+    Numba identifies compiled functions by their entry points. The entry point made here serves only as such an
+    identity; it must not be called.
     """
     entry = _dynfunc.make_function(about.lookup_module(), about.qualname, "", 0, environment, (library,))
     target_context.insert_user_function(entry, about, [library])

@@ -261,9 +261,9 @@ class Kernel(CPUDispatcher):
         return entry
 
     def get_call_template(self, args, kws):
-        """Numba's template, with which another kernel types a call of this one for arguments of these types."""
+        """Numba's template for types of arguments, with which another kernel types a call of this kernel."""
         return self._part.get_call_template(args, kws)
 
     def get_overload(self, sig):
-        """Numba's entry point, with which another kernel lowers a call of this one."""
+        """Numba's entry point, with which another kernel lowers a call of this kernel."""
         return self._part.get_overload(sig)

@@ -140,7 +140,7 @@ class FoldingBuilder(KernelBuilder):
     """`KernelBuilder` that knows structures by their members, and computes with constants while it writes."""
 
     def extract_value(self, agg, idx, name=""):
-        """Read a member of a structure: the value that was inserted if it is known, else by an instruction."""
+        """Read a member of a structure: return the inserted value if it is known, else emit an instruction."""
         position = _position(idx)
         agg = _split_constant(agg)
         while position and isinstance(agg, (StructInMemory, StructByMembers)):
@@ -231,7 +231,7 @@ def word_constant(value: int) -> ir.Constant:
 
 
 def known_integer(value):
-    """Integer that an LLVM value is, if it is an integer constant; else None."""
+    """Value of an LLVM integer constant; None for any other LLVM value."""
     return value.constant if _is_number(value) else None
 
 

@@ -118,7 +118,7 @@ class _UserLower(Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class UserLowering(NativeLowering):
-    """Pass that lowers a user's function to LLVM IR; exceptions in it name the line."""
+    """Pass that lowers a user's function to LLVM IR; an exception that the function raises names its line."""
 
     _name = "users_lowering"
     lowering_class = _UserLower

@@ -57,7 +57,7 @@ class MemoisedFunction(types.Function):
         self.signatures = _make_table()
 
     def augment(self, other):
-        """Type of the function, as Numba's own, with the templates of `other` added."""
+        """Make Numba's own type of the function, with the templates of `other` added."""
         return types.Function(self.templates).augment(other)
 
     def get_call_type(self, context, args, kws):
@@ -76,7 +76,7 @@ register_model(MemoisedFunction)(models.OpaqueModel)
 
 
 class MemoisedTyping(typing.Context):
-    """Typing context that shares everything with one of Numba, and caches its answers.
+    """Typing context that shares the state of one of Numba's contexts, and caches its answers.
 
     Parameters
     ----------

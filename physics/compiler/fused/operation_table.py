@@ -24,7 +24,7 @@ _TYPING = tuple(module for module in _LOWERING if hasattr(module, "signature"))
 
 
 def signature_of(function: types.Function, context: typing.Context, args: tuple) -> typing.Signature | None:
-    """Signature of a call of a built-in function for these types of arguments; None: it is left to Numba.
+    """Signature of a call of a built-in function for these types of arguments; None if Numba must find it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def signature_of(function: types.Function, context: typing.Context, args: tuple)
 
 
 def lowering_of(function, sig: typing.Signature) -> Callable | None:
-    """Find the function that lowers calls of a built-in function for a signature; None: it is left to Numba.
+    """Find the function that lowers calls of a built-in function for a signature; None if Numba must lower them.
 
     Parameters
     ----------

@@ -225,12 +225,12 @@ def _last(builder, first):
 
 
 def _read_row(context, builder, sig, args):
-    """Lower `load_lanes`; the alignment is that of one number, since a table may begin at any number."""
+    """Lower `load_lanes`, without assuming an address divisible by 32: a table may begin at any number."""
     return builder.load(_place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
 
 
 def _write_row(context, builder, sig, args):
-    """Lower `store_lanes`: write four neighbouring numbers of a table; the alignment is that of one number."""
+    """Lower `store_lanes`: write four neighbouring numbers of a table, at an address divisible by 8 only."""
     builder.store(_spread(builder, args[3]), _place_of_row(context, builder, sig, args), align=NUMBER_SIZE)
     return context.get_dummy_value()
 
@@ -286,7 +286,7 @@ def _read(context, builder, sig, args):
 
 
 def _lane(builder, value, k: int):
-    """Lane number `k` of a value: the number from which it was made if that is known, else by an instruction."""
+    """Lane number `k` of a value: the number that was inserted there if it is known, else read by an instruction."""
     made = value
     while isinstance(made, InsertElement):
         made, number, place = made.operands

@@ -91,7 +91,7 @@ def records_of(value):
 
 
 def type_of(value):
-    """Type of an argument by which kernels are chosen: of records their dtype, of tuples that of all members."""
+    """Type of an argument by which kernels are chosen: dtype of a record, class and types of members of a tuple."""
     if isinstance(value, (Record, RecordArray)):
         return value.dtype
     return (type(value), *map(type_of, value)) if isinstance(value, tuple) else type(value)

@@ -119,7 +119,7 @@ def _of_each(function: Callable, of: Callable) -> None:
 
 
 def _of_two(function: Callable, of: Callable) -> None:
-    """Register with Numba that `function` of two lanes, or of lanes and a number, is `of` applied to each pair."""
+    """Register `function` of two lanes, or of lanes and a number, with Numba: it applies `of` to each pair."""
 
     @_overloaded(function)
     def choose(x, y):

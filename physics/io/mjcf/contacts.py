@@ -149,7 +149,7 @@ def _exceptions(bodies, still, meet_bodies: bool, friction_of: FrictionOf) -> li
 
 
 def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
-    """True if any of these pairs touch; if only some do, a message about the others goes to `left`."""
+    """True if any of these pairs touch. If only some touch, add a message about the others to `left`."""
     touching = [pair for pair in met if pair.friction is not None]
     apart = [pair for pair in met if pair.friction is None]
     if touching and apart:

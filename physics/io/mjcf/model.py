@@ -173,7 +173,7 @@ def compile_model(mujoco: ModuleType, text: str, root: Element, path: Path | Non
 
 
 def _refusal(message: str, root: Element) -> ModelError:
-    """Make the error with MuJoCo's `message`, to which the value of the attribute that it names is added."""
+    """Make the error with MuJoCo's `message`, followed by the value of the attribute that the message names."""
     told = ", ".join(line.strip() for line in message.splitlines() if line.strip())
     place, attribute = re.search(r", line (\d+)", told), re.search(r"attribute:? '(\w+)'", told)
     line = int(place.group(1)) if place else 0

@@ -115,7 +115,7 @@ def _is_rounding(arm: np.ndarray, placed: Placed) -> bool:
 
 
 def _hull(placed: Placed, start: dict[str, Any]) -> Body:
-    """Make a hull; ValueError unless the centre of mass of its uniform shape is that of the body."""
+    """Make a hull. ValueError if the body's centre of mass is not the centroid of the hull."""
     mass, points = placed.mass.mass, tuple(map(tuple, (placed.pos + placed.shape).tolist()))
     fault = _hull_fault(points)
     if fault:

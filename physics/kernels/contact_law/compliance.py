@@ -152,8 +152,8 @@ def _as_it_ends(n, y, end, h, offset_frame, report, scratch):
 def _lifted(n, x, R, share, offset_frame, scratch):
     """Move the position x out of walls until no contact point is deeper than `share` of its due depth; return it.
 
-    A due depth is that which the contact problem has foretold, a negative gap in `contacts.end_gap`. R is the body's
-    rotation matrix.
+    The due depth of a contact is the depth that the contact problem predicted; `contacts.end_gap` holds it as a
+    negative gap. R is the body's rotation matrix.
     """
     contacts = scratch.contacts
     least = NEGLIGIBLE_SLOP_SHARE * scratch.body.slop

@@ -63,7 +63,7 @@ def material_members(materials: WallMaterials | None) -> list[tuple]:
 
 
 def _body(record):
-    """Record of a body, given itself or in a workspace, as a record or as its type."""
+    """Record of a body: `record` itself, or its member `body` if `record` is a workspace; also for types of records."""
     return backend.member(record, "body") if "body" in members(record) else record
 
 

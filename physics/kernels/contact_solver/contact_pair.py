@@ -1,4 +1,4 @@
-"""Data of one or two contacts of one wall that `two_contacts` works with: contacts, their problem, and trials of it."""
+"""Data of `two_contacts`: one or two contacts of a wall, their contact problem, and trial impulses for it."""
 
 from __future__ import annotations
 

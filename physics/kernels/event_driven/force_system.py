@@ -48,7 +48,7 @@ def _choose_rows(m, P, body, unknowns):
 
 @kernel
 def _set_rows(rows, m, P, body, unknowns):
-    """Fill `unknowns.matrix` with the equations of m unknowns, of the first `rows` indices in `independent_row`."""
+    """Write equations in m unknowns to `unknowns.matrix`: those at the first `rows` indices in `independent_row`."""
     inv_mass, J, A = 1.0 / body.mass, body.J, unknowns.matrix
     F, g = row_vector(unknowns.given_wrench, 0, 0), apply_inverse_inertia(P, J, row_vector(unknowns.given_wrench, 1, 0))
     for i in range(rows):

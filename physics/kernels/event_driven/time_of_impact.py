@@ -91,7 +91,7 @@ def parabola_root(g, r, b):
 def gap_safe_time(g, r, b, third, horizon):
     """Time [s], at most `horizon`, within which a gap cannot close.
 
-    The gap is g [m], with the rate r and the second derivative b; `third` bounds the third one [m/s³].
+    The gap is g [m], with the rate r and the second derivative b; `third` bounds its third derivative [m/s³].
     """
     t = min(horizon, parabola_root(g, r, b - third * horizon / 3.0))
     for _ in range(_MAX_HORIZON_DOUBLINGS):

@@ -168,7 +168,7 @@ def hold_mean_loads(y, end, h, gyroscopic, offset_frame, body):
 
 @if_declared()
 def hold_softened_loads(y, h, gyroscopic, offset_frame, body):
-    """Let the softened loads of the middle of a stage act, of length h [s] from the state y, in contact or flight."""
+    """Let softened loads act over a stage of h [s] from the state y: the loads at the middle of the stage."""
     x, q, v, L = y
     half = 0.5 * h
     t = body.now + half

@@ -83,7 +83,7 @@ def soften_linked_arm(loads, h, R, state, p, J):
 
 @inlined
 def linked_spring_energy(state, p, t):
-    """Potential energy of a spring between two bodies that counts for one of them: half of ½ k (l - l0)² [J]."""
+    """Share of one body in the potential energy of a spring between two bodies: half of ½ k (l - l0)² [J]."""
     if p[LINK_OTHER] < 0.0:
         return 0.0
     _, _, l = spring_vector(state, p)
@@ -91,7 +91,7 @@ def linked_spring_energy(state, p, t):
 
 
 def _first_columns(record) -> list[int]:
-    """First column of each spring between two bodies, in a body's record or in the type of one."""
+    """First column of each spring between two bodies; `record` is a body's record, or the type of such a record."""
     return [first for term, first, _ in iterate_terms(record, LOAD) if term.function is linked_spring]
 
 
@@ -118,7 +118,7 @@ def _if_linked(where, otherwise):
 
 
 def _record(bodies):
-    """Record of one body from a group of arguments with the member `body`, or its type from the group's type.
+    """Record of one body from a group of arguments with the member `body`; for the group's type, the record's type.
 
     Such a group is `LinkedWorld` or `multibody.data.arrays.Bodies`.
     """

@@ -19,7 +19,7 @@ DEPENDENT_TOLERANCE = 2.0**-40
 
 @kernel
 def clamp_index(floats, index, n, count, k):
-    """Append index k to the `count` clamped ones, and its row to the Cholesky factor; n is the size of the problem.
+    """Append index k to the `count` clamped indices, and its row to the Cholesky factor; n is the size of the problem.
 
     Returns False if k depends linearly on the clamped indices; then it is not added.
     """

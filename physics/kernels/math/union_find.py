@@ -13,7 +13,7 @@ from physics.compiler.decorators import inlined
 
 @inlined
 def find_root(b, parent):
-    """Find the root of the set that holds b, and shorten the links on the way; it is the set's lowest index."""
+    """Find the root of the set that holds b, which is the lowest index of the set, and shorten the links on the way."""
     while parent[b] != b:
         parent[b] = parent[parent[b]]
         b = parent[b]

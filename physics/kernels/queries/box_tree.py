@@ -102,7 +102,7 @@ def _part_at(first, middle, last, axis, scratch):
 
 @kernel
 def _order_bodies(scratch):
-    """Order the bodies so that those of a subtree are neighbours: halve them along their widest axis, and each half.
+    """Order the bodies so that the bodies of each subtree are neighbours, by halving along the widest axis.
 
     A part is cut at a multiple of the bodies of a full subtree, a power of four, so that subtrees are not torn.
     """
@@ -232,9 +232,9 @@ def _put_children(row, found, o, inverse, farthest, tree):
 def find_bodies(o, inverse, farthest, tree):
     """Find the bodies whose boxes a ray meets within `farthest` [m]: (first, end) of their places in `tree.item`.
 
-    Level after level is visited, so that the processor works on several rows at once; from row to child and back, it
-    would wait for each. o is the origin of the ray, `inverse` the inverse of each component of its direction
-    (`safe_inverse`). `tree.distance` is the distance of each box.
+    The tree is visited level by level, so that the processor works on several rows at once. In a depth-first search the
+    processor would wait for each row. o is the origin of the ray, `inverse` the inverse of each component of its
+    direction (`safe_inverse`). `tree.distance` is the distance of each box.
     """
     rows, found, next_item = tree.child.shape[0], 0, 0
     for row in range(tree.top[0], tree.top[1]):

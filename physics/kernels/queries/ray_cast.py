@@ -45,7 +45,7 @@ class Rays(NamedTuple):
 
 
 class Hits(NamedTuple):
-    """Results, a row for each ray of the first world, then of the second, and so on."""
+    """Results of a ray cast: a row for each ray of the first world, then for each ray of the second, and so on."""
 
     distance: np.ndarray  # (rows,) [m]; inf: nothing
     hit: np.ndarray  # (rows,) int, body, or -1 - k for wall k; NOTHING: nothing
@@ -102,7 +102,7 @@ def cast_ray(o, d, farthest, exclude, scratch):
 
 @inlined
 def _unit(a):
-    """Vector a divided by its length, which is not 0; its largest component is divided out first if squares need it."""
+    """Vector a divided by its length, which is not 0; if squares would over- or underflow, a is scaled first."""
     square = qt.dot(a, a)
     if not _LEAST_SQUARE < square < 1.0 / _LEAST_SQUARE:
         s = max(abs(a[0]), abs(a[1]), abs(a[2]))

@@ -1,4 +1,4 @@
-"""Fixed bodies, which no step moves. A group of arrays `bodies` has the member `fixed`; None: its scene has none."""
+"""Fixed bodies, which no step moves. The member `fixed` of `bodies` is None if the scene has no fixed body."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ def _cube_on_edge(offset: float, a: float, mass: float, **start) -> physics.Bloc
 
 
 def on_vertex(on: Setting) -> Sequence[Check]:
-    """A cube stands on a vertex: dropped on it it gets no spin, balanced it stays, nudged it falls.
+    """A cube stands on a vertex: after a drop it gets no spin, in balance it stays, after a nudge it falls.
 
     The normal force passes through the centre. So there is no moment but that of rounding, ε a, which grows by cosh(λT)
     once the cube stands. About the vertex I = (11/12) m a² perpendicular to the diagonal, and the centre is at R =

@@ -86,7 +86,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Found:
-    """Measurements of one job."""
+    """Measurements of one `Job`."""
 
     job: Job
     frontier: physics.Frontier

@@ -193,7 +193,7 @@ def _write_anchor(k, b, first, point, many):
 
 @inlined
 def _first_body_share(a, b, many):
-    """Weight of body a's point in the common point of a contact of a and b whose normal belongs to no body.
+    """Weight of body a's contact point in the common contact point of a and b, for a normal that neither body owns.
 
     The weight is 1 if a is rounder than b, 0 if b is rounder than a, else 1/2: the point of a round body stays under
     its centre. A sphere is rounder than an ellipsoid, and an ellipsoid is rounder than a block or a hull.

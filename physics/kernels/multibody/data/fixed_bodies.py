@@ -41,7 +41,7 @@ def end_of(b, many):
 
 @if_given("many.bodies.fixed", _same_end)
 def shown_end(end, many):
-    """End of a contact as users see it: the index of a body, moving or fixed, or -1 - k for wall k."""
+    """End of a contact in the numbering of users: the index of a body, moving or fixed, or -1 - k for wall k."""
     b = body_at(end, many)
     return b if b >= 0 else end
 

@@ -101,7 +101,7 @@ def make_hulls(bodies: Sequence[Solid | None]) -> Hulls:
 
 
 def clipped_face_capacity(bodies: Sequence[Solid | None]) -> int:
-    """Largest number of corners of a face of one body, clipped by the sides of a face of another.
+    """Largest number of corners of a body's face after clipping by the sides of another body's face.
 
     `bodies` is as in `make_hulls`. Each clipping side cuts off at least one corner and makes two.
     """

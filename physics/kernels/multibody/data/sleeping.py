@@ -81,7 +81,7 @@ def is_staying_asleep(world, wrench, sleep, many):
 
 @inlined
 def _has_fixed_body(k, many):
-    """True if a body of near pair k is fixed: it belongs to no group, and wakes nothing."""
+    """True if near pair k has a fixed body; fixed bodies join no group, and wake no other body."""
     return is_fixed(many.broadphase.pairs[k, 0], many.bodies) or is_fixed(many.broadphase.pairs[k, 1], many.bodies)
 
 

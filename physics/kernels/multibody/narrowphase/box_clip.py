@@ -44,8 +44,8 @@ def clip_polygon(source, count, axis, sign, bound, side, slop, many):
 
     The polygon has `count` vertices in copy `source` of `many.narrowphase.polygon`; the result is written to the other
     copy. `side` is the number of the clipping edge. A vertex outside by at most the slop [m] stays, too, since it would
-    otherwise come and go by rounding where two faces end together. It takes the place of the crossing of its edge with
-    the bound, which may be far away if the edge is nearly parallel to it.
+    otherwise come and go by rounding where two faces end together. Such a vertex replaces the point where its edge
+    crosses the bound, which is far away if both are nearly parallel.
     """
     p, edge, into = many.narrowphase.polygon, many.narrowphase.edge, 1 - source
     kept = 0

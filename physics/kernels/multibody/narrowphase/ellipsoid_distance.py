@@ -233,7 +233,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
 
 @inlined
 def center_direction(d):
-    """Unit vector along d, from the centre of b to that of a; (0, 1, 0) if the centres coincide."""
+    """Unit vector along d, which points from the centre of b to the centre of a; (0, 1, 0) if the centres coincide."""
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:
         return (d[0] / size, d[1] / size, d[2] / size)

@@ -43,8 +43,8 @@ def _clip_polygon(source, count, m, bound, side, slop, hulls):
 
     The polygon has `count` vertices in copy `source` of `hulls.polygon`. `side` is the number of the clipping edge. A
     vertex outside by at most the slop [m] stays, too, since it would otherwise come and go by rounding where two faces
-    end together. It takes the place of the crossing of its edge with the bound, which may be far away if the edge is
-    nearly parallel to it.
+    end together. Such a vertex replaces the point where its edge crosses the bound, which is far away if both are
+    nearly parallel.
     """
     p, sides, into = hulls.polygon, hulls.sides, 1 - source
     furthest = -math.inf

@@ -146,9 +146,9 @@ def clear_all_impulses(n, many):
 def alternate_second_order(part, friction, scale, residual, goal, limit, many):
     """Improve the impulses of an island by interior-point and Newton's method in turns: (iterations, residual [m/s]).
 
-    `scale` is the speed that residuals are relative to, `residual` that of the start, and `goal` the residual to reach,
-    all in m/s. There are at most `limit` iterations, except those of the last method begun. The best impulses are kept.
-    `part` and `friction` are as in `proximal_newton.newton_contacts`.
+    All speeds are in m/s: `scale` is the reference of relative residuals, `residual` the residual at the start, and
+    `goal` the residual to reach. There are at most `limit` iterations, except those of the last method begun. The best
+    impulses are kept. `part` and `friction` are as in `proximal_newton.newton_contacts`.
     """
     count, best, start, last = 0, residual, residual, len(NEWTON_RHO) - 1
     save_best(part, many)
@@ -255,7 +255,7 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
 
 @inlined
 def max_impulse_speed(first, last, many):
-    """Largest speed that the impulse of one contact alone would cause at it [m/s].
+    """Largest change of a contact's velocity by its own impulse alone, over some contacts [m/s].
 
     The contacts are `many.islands.contacts[first:last]`.
     """

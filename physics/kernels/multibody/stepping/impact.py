@@ -93,7 +93,7 @@ def impact_speed_limit(k, h, many):
 
 @inlined
 def _pair_touches(k, step, many):
-    """True if contact k touches, or any contact of the same pair that comes after it in steps of `step`, 1 or -1."""
+    """True if contact k touches, or any later contact of the same pair (`step` = 1), or any earlier one (-1)."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     least = arrival_gap(a, b, many)
     while 0 <= k < many.counts[NUM_CONTACTS] and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
@@ -160,8 +160,8 @@ def _is_in_same_moment(k, many):
     """True if open contact k has a gap so small that it belongs to an impact of other contacts.
 
     That is a gap of at most two slops. If the pair touches elsewhere, it also is a gap of at most the tolerance times a
-    length: the way that the contact closes in the substep, or ten radii of the smaller body. Else the corners of one
-    face would hit one after another, and each would turn the body that the next one turns back.
+    length: the way that the contact closes in the substep, or ten radii of the smaller body. Otherwise the corners of a
+    face would hit one after another, and the impact of each would reverse the body's turn.
     """
     a, b, gap = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.gap[k]
     if gap <= _SAME_MOMENT_SLOPS * pair_slop(a, b, many):

@@ -1,7 +1,7 @@
 """Pairs of bodies that pass each other within a stage: their contact acts along a plane that parts them.
 
 A contact of two bodies that are apart keeps its normal through the stage: the direction between their nearest points at
-the start. For a body that slides past an edge, this direction can be a wall across its way. For such pairs the normal
+the start. For a body that slides past an edge, a contact with this normal can block its way. For such pairs the normal
 is taken from the motion instead. If bodies a and b move freely and turn little, their Minkowski difference A - B sweeps
 the convex hull of its places at the start and at the end of the stage. If that hull does not hold the origin, the
 bodies never touch. The direction n in which it is nearest to the origin then parts them: n·(a - b) > 0 for all their

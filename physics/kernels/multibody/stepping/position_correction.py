@@ -209,7 +209,7 @@ def _displace(b, offset_frame, many):
 
 @inlined
 def _displace_all(offset_frame, many):
-    """Move and turn all pushed bodies, and take the work of lifting them from the motion of the lifted ones."""
+    """Move and turn all pushed bodies; take the work of lifting from the kinetic energy of the lifted bodies."""
     total = ups = free = 0.0
     for b in range(many.bodies.state.shape[0]):
         many.bodies.lift_work[b] = 0.0

@@ -55,7 +55,7 @@ class Run(Protocol):
 
 
 class Engine(Protocol):
-    """Another engine.
+    """Interface of another physics engine: its settings, and runs of scenes in it.
 
     Attributes
     ----------
