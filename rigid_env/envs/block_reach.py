@@ -37,7 +37,7 @@ class BlockReachEnv(BlockEnv):
 
     ## Observation Space
 
-    `Box` of 24 float32, world frame. Each number is given in its unit and clipped to its bounds. R is the rotation
+    `Box` of 24 float32, world frame. Each number is told in its unit and clipped to its bounds. R is the rotation
     matrix from body to world, by rows. Walls: the floor, then left and right (`three`), or x = 0 and z = 0 (`corner`).
 
     | Num | Observation | Min | Max | Unit |

@@ -35,7 +35,7 @@ class BlockReorientEnv(BlockEnv):
 
     ## Observation Space
 
-    `Box` of 23 float32, world frame. Each number is given in its unit and clipped to its bounds. The body axes are
+    `Box` of 23 float32, world frame. Each number is told in its unit and clipped to its bounds. The body axes are
     ordered from the target face. The outward normal of the target face comes first, then the next two body axes in
     cyclic order (x, y, z, x, ...). The half edges along the three follow.
 

@@ -61,7 +61,7 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
     ## Observation Space
 
     `Box` of 18 float32 for each body of the scene, in their order, and 3 of the goal if there is one. World
-    frame. Each number is given in its unit and clipped to its bounds. R is the rotation matrix from body to world, by
+    frame. Each number is told in its unit and clipped to its bounds. R is the rotation matrix from body to world, by
     rows. With one body and a goal:
 
     | Num | Observation | Min | Max | Unit |
