@@ -79,10 +79,10 @@ class BlockReachEnv(BlockEnv):
     At rest on the floor on a random face, with a random yaw, at a random place clear of the walls; the
     goal is another such place. All are drawn uniformly from the square `|x|, |z| <= half_width`
     (`corner`: `0 <= x, z <= 2 half_width`), less 0.25 m and half the block's diagonal on each side.
-    `reset(options=...)` fixes the draws that it names, for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the
-    face that is down, 0 to 5 for -x, +x, -y, +y, -z, +z) and `goal` (x, z) [m]. Both places are inside the square. The
-    parameters `mass`, `size`, `friction`, `restitution` and `gravity` can be fixed as well, randomised or not. The
-    other draws of a seed stay the same.
+    `reset(options=...)` fixes draws for this episode: `place` (x, z) [m], `yaw` [rad], `face` (the face that is down, 0
+    to 5 for -x, +x, -y, +y, -z, +z) and `goal` (x, z) [m]. Both places are inside the square. The parameters `mass`,
+    `size`, `friction`, `restitution` and `gravity` can be fixed as well, randomised or not. The other draws of a seed
+    stay the same.
 
     ## Episode End
 

@@ -101,9 +101,9 @@ class SceneEnv(RigidEnv[NDArray[Any]]):
 
     Poses and velocities of the scene. `[environment.start]` has half widths of random variations, three numbers each.
     For every body, variations drawn uniformly within them are added to `pos` [m], `linvel` [m/s] and `angvel` [rad/s].
-    A goal with `low` and `high` is drawn uniformly between them. `reset(options=...)` fixes the draws that it names,
-    for this episode: `goal` (three numbers), `start_pos`, `start_linvel`, `start_angvel` (three for each body). The
-    other draws of a seed stay the same.
+    A goal with `low` and `high` is drawn uniformly between them. `reset(options=...)` fixes draws for this episode:
+    `goal` (three numbers), `start_pos`, `start_linvel`, `start_angvel` (three for each body). The other draws of a seed
+    stay the same.
 
     ## Episode End
 
