@@ -139,7 +139,7 @@ class BlockPose(BlockTask):
         return OnFloor(self.area)
 
     def declared_draws(self):
-        """Distributions of the block's tasks, and those of the goal's heading and face."""
+        """Distributions of the block's tasks, with the distributions of the goal's heading and face added."""
         return {**super().declared_draws(), "heading": YAW, "target_face": OtherFace()}
 
     def measure(self, worlds):

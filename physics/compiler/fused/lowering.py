@@ -24,7 +24,7 @@ from physics.compiler.fused.prepared_entry import write_prepared_entry
 
 
 class _Values(Lower):
-    """Lowering of one function as by Numba, but a variable assigned once is a value, and nothing is released."""
+    """Numba's lowering of a function, but without stack slots for variables assigned once, and without releases."""
 
     def _find_singly_assigned_variable(self):
         times = Counter(

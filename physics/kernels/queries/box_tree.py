@@ -218,7 +218,7 @@ def _put(item, distance, found, tree):
 
 @inlined
 def _put_children(row, found, o, inverse, farthest, tree):
-    """Put the children of a row that a ray meets into the list; return the new number of items."""
+    """Append the children of a row whose boxes a ray meets to the list; return the new number of items."""
     near = _box_distances(row, o, inverse, farthest, tree)
     if not min_of_lanes(near) < math.inf:
         return found

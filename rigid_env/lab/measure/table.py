@@ -42,7 +42,7 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def number_range(lowest: float, highest: float, digits: int = 3) -> str:
-    """Text of a range in the format of `number`, or of one number if both are equal; the letter stands at the end."""
+    """Text of a range in the format of `number`, with one letter at the end (k, M); one number if both are equal."""
     size, letter = next(((size, letter) for size, letter in SCALES if abs(highest) >= size), (1.0, ""))
     ends = dict.fromkeys(f"{value / size:.{digits}g}" for value in (lowest, highest))
     return "..".join(ends) + letter
