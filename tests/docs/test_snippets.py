@@ -19,7 +19,12 @@ USAGE_ERROR = typer.BadParameter.__base__
 
 # Pages whose scenes and trainings take long, and those whose blocks run one by one: `test_tasks_page`, `test_readme`.
 LONG = ("docs/environments.md", "docs/tasks.md", "README.md")
+# Pages of many small scenes, whose kernels take longer to compile than their steps take in Python.
+SMALL = ("docs/conventions.md", "docs/effects.md", "docs/pictures.md", "docs/queries.md", "docs/reports.md")
 PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
+for page in PAGES:
+    if page.id in SMALL:
+        page.marks += (pytest.mark.interpreted,)
 
 
 @pytest.mark.parametrize("page", PAGES)
