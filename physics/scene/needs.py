@@ -149,7 +149,7 @@ def find_needs(scene: Scene) -> Needs:
 
 
 def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool, bool, bool]:
-    """Whether bodies can touch each other, whether they can touch walls, and whether groups must be asked for that.
+    """Answer whether bodies can touch each other, whether they can touch walls, and whether groups decide which.
 
     Groups that keep all bodies apart, and none from a wall, are `Contact(between_bodies=False)`.
     """

@@ -22,9 +22,7 @@ LONG = ("docs/environments.md", "docs/tasks.md", "README.md")
 # Pages of many small scenes, whose kernels take longer to compile than their steps take in Python.
 SMALL = ("docs/conventions.md", "docs/effects.md", "docs/pictures.md", "docs/queries.md", "docs/reports.md")
 PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
-for page in PAGES:
-    if page.id in SMALL:
-        page.marks += (pytest.mark.interpreted,)
+PAGES = [page._replace(marks=(*page.marks, pytest.mark.interpreted)) if page.id in SMALL else page for page in PAGES]
 
 
 @pytest.mark.parametrize("page", PAGES)
