@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS, LAW_TANGENTIAL
 from physics.kernels.state.sleeping import SLEEP_SIZE
 from physics.scene.effects import Actuator, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot
 from physics.scene.force_fields import FIELDS
+from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import has_restitution
 from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE
 
@@ -30,6 +33,9 @@ def _gravity_row(gravity) -> Row:
 
 
 def _contact_row(scene, contact) -> Row:
+    touching = touching_pairs(scene, True)
+    if contact is not None and touching is not None and scene.walls and not touching[:, len(scene.bodies) :].any():
+        return Row("wall contact", False, "groups keep all bodies from all walls", "")
     if contact is not None and scene.walls:
         hulls = ", corners of hulls" if any(body.kind == "hull" for body in scene.bodies) else ""
         return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{hulls}, impacts, solver")
@@ -50,7 +56,8 @@ def _between_row(scene, contact, many) -> Row:
         return Row("body contact", False, "not declared", "")
     if len(scene.bodies) == 1:
         return Row("body contact", False, "declared, but the scene has one body", "")
-    return Row("body contact", False, "declared without contact between bodies", "")
+    why = "groups keep all bodies apart" if contact.between_bodies else "declared without contact between bodies"
+    return Row("body contact", False, why, "")
 
 
 def _fixed_rows(scene) -> tuple[Row, ...]:
@@ -60,6 +67,17 @@ def _fixed_rows(scene) -> tuple[Row, ...]:
         return ()
     reason = f"declared: {'body' if len(fixed) == 1 else 'bodies'} {', '.join(map(str, fixed))}"
     return (Row("fixed bodies", True, reason, "to the solver walls, with a shape of their own"),)
+
+
+def _group_rows(scene, grouped) -> tuple[Row, ...]:
+    """Row that counts the pairs that collision groups keep apart; none if all groups and masks have their defaults."""
+    touching = touching_pairs(scene, True)
+    if touching is None:
+        return ()
+    apart, count = potential_pairs(scene, True) & ~touching, len(scene.bodies)
+    of_bodies, of_walls = int(np.triu(apart[:, :count]).sum()), int(apart[:, count:].sum())
+    reason = f"declared: bits keep apart {of_bodies} pair(s) of bodies and {of_walls} of a body and a wall"
+    return (Row("collision groups", bool(grouped), reason, "a test of bits for each pair" if grouped else ""),)
 
 
 def _own_coefficients(scene, name, pairs, rule, usual) -> str:
@@ -192,6 +210,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
         _sleeping_row(scene, touching, needs.sleeping),
         _contact_row(scene, contact),
         _between_row(scene, contact, needs.meeting),
+        *_group_rows(scene, needs.grouped),
         _friction_row(scene, needs),
         _restitution_row(scene, needs),
         _tangential_row(contact, needs.laws),

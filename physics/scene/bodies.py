@@ -15,6 +15,7 @@ from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
+from physics.scene.groups import GROUP, MASK, check_groups
 from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
 
 FROM_DENSITY: Any = None  # default of `mass`, replaced by density times volume when the body is made
@@ -93,6 +94,9 @@ class Body(_Shape):
     fixed : bool
         True: the body stays where it is, like a wall of this shape. Other bodies rest on it and hit it; no force moves
         it. Mass, density and inertia must be left out; the attribute `mass` is then infinite. Velocities must be 0.
+    group, mask : int
+        Bits of the collision groups that the body belongs to, and of those that it touches. Two bodies, or a body and a
+        wall, touch only if the group of each has a bit of the other's mask. By default all touch.
 
     Raises
     ------
@@ -111,6 +115,8 @@ class Body(_Shape):
     friction: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     restitution: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     fixed: bool = field(default=False, metadata=SHOWN_IF_GIVEN)
+    group: int = field(default=GROUP, metadata=SHOWN_IF_GIVEN)
+    mask: int = field(default=MASK, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def _repr_html_(self) -> str:
@@ -135,6 +141,7 @@ class Body(_Shape):
         if self.name is not None:
             check_name(self.name)
         check_coefficients(self)
+        check_groups(self)
         if not self.fixed:
             self._check_range()
 

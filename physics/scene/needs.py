@@ -21,6 +21,7 @@ from physics.kernels.state.layout import VERTEX_COUNT
 from physics.mass.inertia import principal_axes
 from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, FieldSlot, field_slots
+from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import find_materials, has_restitution
 from physics.scene.scene import Scene
 
@@ -51,6 +52,8 @@ class Needs:
     walls_differ, pair_materials : bool
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
+    grouped : bool
+        Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -82,6 +85,7 @@ class Needs:
     material_columns: int
     walls_differ: bool
     pair_materials: bool
+    grouped: bool
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -118,8 +122,8 @@ def find_needs(scene: Scene) -> Needs:
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
     kinds = frozenset(body.kind for body in scene.bodies)
     fixed = any(body.fixed for body in scene.bodies)
-    meeting = contact is not None and (fixed or (contact.between_bodies and len(scene.bodies) > 1))
-    touching = contact is not None and (bool(scene.walls) or meeting)
+    meeting, at_walls, grouped = _meetings(scene, contact, fixed)
+    touching = at_walls or meeting
     axes = [principal_axes(body.inertia) for body in scene.bodies if not body.fixed]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
@@ -131,6 +135,7 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
+        grouped=grouped,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,
@@ -141,6 +146,21 @@ def find_needs(scene: Scene) -> Needs:
         fields=fields,
         laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip
+
+
+def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool, bool, bool]:
+    """Answer whether bodies can touch each other, whether they can touch walls, and whether groups decide which.
+
+    Groups that keep all bodies apart, and none from a wall, are `Contact(between_bodies=False)`.
+    """
+    if contact is None:
+        return False, False, False
+    touching, bodies = touching_pairs(scene, contact.between_bodies), len(scene.bodies)
+    if touching is None:
+        return fixed or (contact.between_bodies and bodies > 1), bool(scene.walls), False
+    meeting, at_walls = bool(touching[:, :bodies].any()), bool(touching[:, bodies:].any())
+    apart = potential_pairs(scene, contact.between_bodies) & ~touching
+    return meeting, at_walls, bool(apart[:, bodies * (not meeting) :].any()) and (meeting or at_walls)
 
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
+from physics.scene.groups import GROUP, MASK, check_groups
 from physics.scene.materials import check_materials
 from physics.scene.springs import check_ends
 from physics.summary import SCREEN, SHOWN_IF_GIVEN, counted, fields_repr, parts_repr, shown
@@ -62,6 +63,8 @@ class HalfSpace:
     friction, restitution : float, optional
         Coefficients μ, at least 0, and e, from 0 to 1. `Friction.rule` and `Contact.restitution_rule` combine them with
         those of a body. None: the body's own act.
+    group, mask : int
+        Bits of the collision groups that the wall belongs to, and of those that it touches, as of a body.
     """
 
     normal: Vector
@@ -69,6 +72,8 @@ class HalfSpace:
     name: str | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
     friction: float | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
     restitution: float | None = field(default=None, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    group: int = field(default=GROUP, kw_only=True, metadata=SHOWN_IF_GIVEN)
+    mask: int = field(default=MASK, kw_only=True, metadata=SHOWN_IF_GIVEN)
 
     if TYPE_CHECKING:
 
@@ -80,6 +85,8 @@ class HalfSpace:
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,
+            group: int = GROUP,
+            mask: int = MASK,
         ) -> None: ...
 
     __repr__ = fields_repr
@@ -95,6 +102,7 @@ class HalfSpace:
         if self.name is not None:
             check_name(self.name, "HalfSpace.name")
         check_coefficients(self, "HalfSpace.")
+        check_groups(self, "HalfSpace.")
 
 
 @known_keywords

@@ -13,6 +13,7 @@ from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLO
 from physics.kernels.multibody.stepping.step import step_many
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.effects import Contact
+from physics.scene.groups import group_table
 from physics.scene.needs import Needs
 from physics.scene.polyhedra import polyhedra
 from physics.scene.scene import Scene
@@ -48,7 +49,7 @@ class ManyBodies(Scheme):
 
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
-        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls)
+        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls or needs.grouped)
         return (is_coupled or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
@@ -56,7 +57,8 @@ class ManyBodies(Scheme):
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, fixed bodies and Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, fixed bodies, groups that keep some bodies "
+                "from some walls, and Spring between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
@@ -65,6 +67,7 @@ class ManyBodies(Scheme):
         fixed = np.array([body.fixed for body in scene.bodies], np.int64) if switches.fixed else None
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
+            groups=group_table(scene) if switches.grouped else None,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,

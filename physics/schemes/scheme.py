@@ -65,6 +65,8 @@ class Switches:
         Whether bodies can touch each other.
     fixed : True or None
         Whether some bodies are fixed.
+    grouped : True or None
+        Whether collision groups keep some pairs apart that would touch otherwise.
     ellipsoids : True or None
         Whether ellipsoids are among bodies that can touch each other.
     hulls : True or None
@@ -95,6 +97,7 @@ class Switches:
     integrator: int | None
     meeting: bool
     fixed: bool | None
+    grouped: bool | None
     ellipsoids: bool | None
     hulls: bool | None
     sleeping: bool | None

@@ -9,6 +9,7 @@ from zlib import crc32
 
 from physics.scene.effects import Actuator, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
+from physics.scene.groups import GROUP, MASK
 from physics.scene.materials import find_materials
 from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE
 from physics.scene.scene import HalfSpace, Scene
@@ -41,9 +42,10 @@ def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[s
 
 
 def _body(body) -> str:
-    """Text for a body: its kind, for a hull a checksum of its corners, and whether it is fixed."""
+    """Text for a body: its kind, for a hull a checksum of its corners, whether it is fixed, and its groups."""
     kind = f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
-    return f"fixed {kind}" if body.fixed else kind
+    kind = f"fixed {kind}" if body.fixed else kind
+    return " with ".join([kind, *_settings(body, {"group": GROUP, "mask": MASK})])
 
 
 def _wall(wall: HalfSpace) -> str:

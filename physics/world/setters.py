@@ -12,8 +12,9 @@ from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
 from physics.scene.body_names import body_label
-from physics.scene.effects import RESISTANCES, Friction
+from physics.scene.effects import RESISTANCES, Contact, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
+from physics.scene.groups import may_meet
 from physics.scene.springs import check_ends
 from physics.summary import shown
 from physics.world import choice, materials, parameters
@@ -187,31 +188,36 @@ def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
     """Refuse two bodies with their geometric centres in the same place, since no direction separates them best.
 
-    Bodies are sorted along the direction `SKEW`, and only neighbours in this order are compared. Equal centres are
-    neighbours along any direction; other centres hardly ever coincide along this one.
+    Bodies are sorted along the direction `SKEW`. Equal centres are neighbours along any direction; other centres hardly
+    ever coincide along this one. So later neighbours are compared only while some that touch nothing share a place.
     """
+    bodies, contact = world.scene.bodies, world.scene.effect(Contact)
     shape = (len(chosen), world.body_count)
     centres = geometric_centres(world, state, params).reshape(*shape, 3)
     radii = params[:, at.RADIUS].reshape(shape)
     with np.errstate(over="ignore", invalid="ignore"):  # the report of a step tells about numbers that are too large
         order = np.argsort(centres @ SKEW, axis=1, kind="stable")
-        centres = np.take_along_axis(centres, order[:, :, None], axis=1)
-        apart = np.abs(np.diff(centres, axis=1)).max(axis=2)
-    fixed = _fixed(world)[order]
-    apart[fixed[:, 1:] & fixed[:, :-1]] = np.inf  # fixed bodies may overlap
-    radii = np.take_along_axis(radii, order, axis=1)
-    bad = np.argwhere(apart <= SAME_PLACE * np.minimum(radii[:, 1:], radii[:, :-1]))
-    if len(bad):
-        k, i = bad[0]
-        a, b = sorted(order[k, i : i + 2].tolist())
-        first = k * world.body_count
-        places = [state[first + body, at.POS : at.POS + 3].tolist() for body in (a, b)]
-        first_label, second_label = (body_label(body, world.names) for body in (a, b))
-        raise ValueError(
-            f"{what}: bodies {first_label} and {second_label} in world {int(chosen[k])} have their centres in the "
-            f"same place, pos {places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is "
-            "lifted apart)"
-        )
+        centres, radii = (np.take_along_axis(each, order[..., None], axis=1) for each in (centres, radii[..., None]))
+        for lag in range(1, world.body_count):
+            apart = np.abs(centres[:, lag:] - centres[:, :-lag]).max(axis=2)
+            found = np.argwhere(apart <= SAME_PLACE * np.minimum(radii[:, lag:, 0], radii[:, :-lag, 0]))
+            if not len(found):
+                return
+            for k, i in found:
+                pair = sorted((int(order[k, i]), int(order[k, i + lag])))
+                if may_meet(bodies[pair[0]], bodies[pair[1]], contact.between_bodies):
+                    raise _same_place(world, state, int(chosen[k]), k * world.body_count, pair, what)
+
+
+def _same_place(world: Batch, state, world_index: int, first: int, pair: list[int], what: str) -> ValueError:
+    """Make the error about the `pair` of bodies of a world, whose rows of `state` begin at `first`."""
+    places = [state[first + body, at.POS : at.POS + 3].tolist() for body in pair]
+    first_label, second_label = (body_label(body, world.names) for body in pair)
+    return ValueError(
+        f"{what}: bodies {first_label} and {second_label} in world {world_index} have their centres in the "
+        f"same place, pos {places[0]} and {places[1]}; allowed are different places (what overlaps otherwise is "
+        "lifted apart)"
+    )
 
 
 def check_depth(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:

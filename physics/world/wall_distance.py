@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from physics.kernels.half_space.gap_queries import deepest_gaps
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
+from physics.scene.groups import touching_pairs
 from physics.world.batch import Batch
 
 
@@ -20,7 +23,7 @@ def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np
 
 
 def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest gap of every body to any wall.
+    """Smallest gap of every body to any wall that it may touch.
 
     Parameters
     ----------
@@ -37,15 +40,27 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
         Index of the wall with the smallest gap; -1 without walls.
     """
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-    deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
-    if len(world.walls):
-        normals, offsets = world.walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], world.walls[:, at.WALL_OFFSET]
-        for b, body in enumerate(world.scene.bodies):
-            if body.kind == "hull":
-                own = state[b :: world.body_count]
-                R = rotation_matrices(own[:, at.QUAT : at.QUAT + 4])
-                reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
-                each = own[:, at.POS : at.POS + 3] @ normals.T - offsets + reach
-                gaps[b :: world.body_count] = each.min(axis=1)
-                which[b :: world.body_count] = each.argmin(axis=1)
+    touching = touching_pairs(world.scene, True)
+    if touching is None:
+        deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
+    for b, body in enumerate(world.scene.bodies):
+        if touching is None and body.kind != "hull":
+            continue
+        own = np.arange(b, len(state), world.body_count)
+        walls = np.arange(len(world.walls)) if touching is None else np.flatnonzero(touching[b, world.body_count :])
+        if touching is not None:
+            found, index = np.empty(len(own)), np.empty(len(own), np.int64)
+            deepest_gaps(own, state, params, world.shapes, world.walls[walls], found, index)
+            gaps[own], which[own] = found, np.append(walls, -1)[index]
+        if body.kind == "hull" and len(walls):
+            each = _hull_gaps(body, state[own], world.walls[walls])
+            gaps[own], which[own] = each.min(axis=1), walls[each.argmin(axis=1)]
     return gaps, which
+
+
+def _hull_gaps(body: Any, state: np.ndarray, walls: np.ndarray) -> np.ndarray:
+    """Gaps (k, walls) of a hull with the states (k, STATE_SIZE) to walls (walls, WALL_SIZE) [m]."""
+    normals, offsets = walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], walls[:, at.WALL_OFFSET]
+    R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
+    reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+    return state[:, at.POS : at.POS + 3] @ normals.T - offsets + reach

@@ -19,7 +19,10 @@ USAGE_ERROR = typer.BadParameter.__base__
 
 # Pages whose scenes and trainings take long, and those whose blocks run one by one: `test_tasks_page`, `test_readme`.
 LONG = ("docs/environments.md", "docs/tasks.md", "README.md")
+# Pages of many small scenes, whose kernels take longer to compile than their steps take in Python.
+SMALL = ("docs/conventions.md", "docs/effects.md", "docs/pictures.md", "docs/queries.md", "docs/reports.md")
 PAGES = sweep(snippets.pages_with("python"), lambda page: snippets.name_of(page) not in LONG, snippets.name_of)
+PAGES = [page._replace(marks=(*page.marks, pytest.mark.interpreted)) if page.id in SMALL else page for page in PAGES]
 
 
 @pytest.mark.parametrize("page", PAGES)

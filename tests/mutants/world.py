@@ -163,4 +163,23 @@ QUERIES = [
     ),
 ]
 
-WORLDS = [*WORLD, *IO, *QUERIES]
+GROUPS = [
+    _mutant(
+        "groups-one-side",
+        "Two bodies touch if one of their masks holds the group of the other.",
+        "kernels/multibody/data/collision_groups.py",
+        "(groups[b, 0] & groups[row, 1]) != 0 and (groups[b, 1]",
+        "(groups[b, 0] & groups[row, 1]) != 0 or (groups[b, 1]",
+        "test_collision_groups.py::test_two_ends_touch_if_each_has_a_group_of_the_others_mask",
+    ),
+    _mutant(
+        "groups-wall-row",
+        "A wall has the groups of the wall before it.",
+        "kernels/multibody/data/collision_groups.py",
+        "many.bodies.state.shape[0] - 1 - end",
+        "many.bodies.state.shape[0] - 2 - end",
+        "test_collision_groups.py::test_two_ends_touch_if_each_has_a_group_of_the_others_mask",
+    ),
+]
+
+WORLDS = [*WORLD, *IO, *QUERIES, *GROUPS]

@@ -199,10 +199,6 @@ REFUSED = {
         "line 2: <option> has a medium of viscosity 0.1",
     ),
     "sleep": (model(box(), before='<option><flag sleep="enable"/></option>'), "line 2: <flag> lets bodies sleep"),
-    "some touch": (
-        model(box('name="a"'), box('name="b" contype="0" conaffinity="0"'), world=floor('name="f"')),
-        "line 6: <geom 'a'> touches <geom 'f'>, and <geom 'b'> passes through <geom 'f'>",
-    ),
     "spin friction": (model(box(), world=floor('name="f" condim="4"')), "<geom 'f'> has condim 4"),
     "bounce": (model(box('solref=".02 .1"'), world=floor()), "has solref 0.02 0.1, a soft contact"),
     "stiffness of contact": (model(box('solref="-900 0"'), world=floor()), "has solref -900 0"),

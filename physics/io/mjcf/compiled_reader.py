@@ -56,11 +56,15 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
     fields = forces.damping(model, free, left)
     effects = [*forces.gravity(model, free, left), *contact.effects, *fields]
     own = [*contact.bodies, *contact.still[len(planes) :]]
-    bodies = [replace((*free, *fixed)[k].body, friction=own[k]) for k in order]
+    groups = [contact.groups.get(surface, {}) for surface in (*surfaces, *still[len(planes) :])]
+    bodies = [replace((*free, *fixed)[k].body, friction=own[k], **groups[k]) for k in order]
     if contact.effects:
         for error in touching.faults([*planes, *(each.geom for each in (*free, *fixed))]):
             left.add(error)
-    return Scene(bodies, _walls(model, planes, contact, {body.name for body in bodies}), effects)
+    walls = _walls(model, planes, contact, {body.name for body in bodies})
+    if contact.groups:
+        walls = [replace(wall, **contact.groups[surface]) for wall, surface in zip(walls, still)]
+    return Scene(bodies, walls, effects)
 
 
 def _walls(model: Model, met: list[int], contact: FoundContact, taken: set) -> list[HalfSpace]:

@@ -1,8 +1,8 @@
 """Conversion of the contact properties of a MuJoCo model's geoms to the contact and friction of a scene.
 
 In MuJoCo bit masks and lists of pairs decide which geoms touch. A pair has the larger friction of its geoms, unless a
-priority, a condim or the list decides otherwise; a scene has the rule "maximum" for that, and exceptions for pairs. Its
-bodies touch all walls or none, and all other bodies or none.
+priority, a condim or the list decides otherwise; a scene has the rule "maximum" for that, and exceptions for pairs.
+Where only some pairs touch, collision groups say which.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from dataclasses import dataclass, field
 from itertools import combinations_with_replacement
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.text import ModelError
 from physics.scene.effects import Contact, Friction
+from physics.scene.groups import assign_groups
 
 
 @dataclass(frozen=True)
@@ -80,11 +83,22 @@ def touched(surface: Surface, others: Iterable[Surface], friction_of: FrictionOf
 
 
 class FoundContact(NamedTuple):
-    """Contact properties of a model as a scene has them: effects, and friction coefficients of single surfaces."""
+    """Contact properties of a model, as a scene has them.
+
+    Attributes
+    ----------
+    effects : list
+        Effects `Contact` and `Friction`.
+    bodies, still : list of float or None
+        Frictions that bodies that move, and walls and fixed bodies, have of their own.
+    groups : dict of Surface to dict
+        Arguments `group` and `mask` of a body or wall, by its surface; none for those with the defaults.
+    """
 
     effects: list[Any]
     bodies: list[float | None]
     still: list[float | None]
+    groups: dict[Surface, dict[str, int]]
 
 
 def find_contact(
@@ -101,7 +115,7 @@ def find_contact(
     bodies, still : sequence of Surface
         Surfaces of the bodies that move, and of the walls and fixed bodies.
     left : LeftOut
-        Collects a message where only some pairs touch; in the scene all do.
+        Collects a message where some pairs touch, and there are more kinds of these than groups; then all do.
     friction_of : callable
         Returns the friction coefficient of two surfaces, or None if they do not touch.
     ends : sequence of int, optional
@@ -112,11 +126,13 @@ def find_contact(
     between = [
         _Met(a, b, friction_of(a, b)) for a, b in combinations_with_replacement(number, 2) if a != b or number[a] > 1
     ]
-    none = FoundContact([], [None] * len(bodies), [None] * len(still))
-    meet_still = _agreed_contact(at_still, left)
-    meet_bodies = _agreed_contact(between, left)
-    if not meet_still and not meet_bodies:
+    none = FoundContact([], [None] * len(bodies), [None] * len(still), {})
+    meet_still, meet_bodies = ({pair.friction is not None for pair in met} for met in (at_still, between))
+    if True not in meet_still | meet_bodies:
         return none
+    if len(meet_still) == 2 or len(meet_bodies) == 2:
+        none = none._replace(groups=_groups([*number], [*dict.fromkeys(still)], at_still + between, left))
+    meet_bodies = True in meet_bodies
     if len(bodies) == 1:  # there is no other body: decide as if there were a second one with the same masks
         meet_bodies = friction_of(bodies[0], bodies[0]) is not None
     contact = Contact(between_bodies=meet_bodies)
@@ -130,7 +146,7 @@ def find_contact(
     parts = list(zip(ends, (*bodies, *still)))
     pairs = _exceptions(parts[: len(bodies)], parts[len(bodies) :], meet_bodies, friction_of)
     effect = Friction(max(found), rule="maximum", pairs=pairs)
-    return FoundContact([contact, effect], own[: len(bodies)], own[len(bodies) :])
+    return none._replace(effects=[contact, effect], bodies=own[: len(bodies)], still=own[len(bodies) :])
 
 
 def _exceptions(bodies, still, meet_bodies: bool, friction_of: FrictionOf) -> list[tuple[int, int, float]]:
@@ -148,17 +164,23 @@ def _exceptions(bodies, still, meet_bodies: bool, friction_of: FrictionOf) -> li
     return pairs
 
 
-def _agreed_contact(met: list[_Met], left: LeftOut) -> bool:
-    """True if any of these pairs touch. If only some touch, add a message about the others to `left`."""
-    touching = [pair for pair in met if pair.friction is not None]
-    apart = [pair for pair in met if pair.friction is None]
-    if touching and apart:
-        yes, no = touching[0], apart[0]
+def _groups(
+    bodies: list[Surface], still: list[Surface], met: list[_Met], left: LeftOut
+) -> dict[Surface, dict[str, int]]:
+    """Groups and masks with which those pairs of `met` touch that have a friction; none if there are too many kinds."""
+    row = {surface: k for k, surface in enumerate(dict.fromkeys((*bodies, *still)))}
+    touching = np.zeros((len(row), len(row)), bool)
+    for pair in met:
+        touching[row[pair.a], row[pair.b]] |= pair.friction is not None
+    found = assign_groups(touching | touching.T)
+    if found is None:
+        yes, no = (next(pair for pair in met if (pair.friction is None) == apart) for apart in (False, True))
         left.add(
             ModelError(
-                f"{yes.a.label} touches {yes.b.label}, and {no.a.label} passes through {no.b.label}; allowed is that "
-                "bodies touch all planes or none, and each other all or none",
+                f"{yes.a.label} touches {yes.b.label}, and {no.a.label} passes through {no.b.label}; allowed are at "
+                "most 32 kinds of geoms that touch different ones",
                 no.a.line,
             )
         )
-    return bool(touching)
+        return {}
+    return {surface: {"group": group, "mask": mask} for surface, (group, mask) in zip(row, found)}

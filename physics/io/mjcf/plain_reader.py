@@ -110,9 +110,10 @@ def read_scene(root: Element) -> Scene:
     if not contact.effects:
         kept, walls = list(range(len(bodies))), list(range(len(elements), len(geoms)))
     own = dict(zip([*free, *walls, *fixed], [*contact.bodies, *contact.still])) if contact.effects else {}
-    bodies = [replace(bodies[b], friction=own.get(b)) for b in kept]
+    groups = [contact.groups.get(surface, {}) for surface in surfaces]
+    bodies = [replace(bodies[b], friction=own.get(b), **groups[b]) for b in kept]
     taken = {body.name for body in bodies}
-    half_spaces = [_wall(k, geoms[wall], own.get(wall), taken) for k, wall in enumerate(walls)]
+    half_spaces = [replace(_wall(k, geoms[wall], own.get(wall), taken), **groups[wall]) for k, wall in enumerate(walls)]
     return Scene(bodies, half_spaces, effects + contact.effects)
 
 

@@ -12,6 +12,7 @@ from itertools import product
 from physics.compiler.decorators import plain_function
 from physics.kernels.contact_law.materials import RULES, combine
 from physics.scene.effects import Contact, Friction
+from physics.scene.groups import touching_pairs
 from physics.scene.materials import find_materials
 from physics.scene.scene import Scene
 
@@ -60,8 +61,11 @@ class Frictions:
         if contact is None:
             return
         ends = [*(-1 - k for k in range(len(self.walls))), *range(len(bodies))]
+        touching = touching_pairs(self._scene, contact.between_bodies)
         for body, other in product(range(len(bodies)), ends):
             if bodies[body].fixed and (other < 0 or bodies[other].fixed):
+                continue
+            if touching is not None and not touching[body, other if other >= 0 else len(bodies) - 1 - other]:
                 continue
             is_pair_of_moving = other >= 0 and not (bodies[body].fixed or bodies[other].fixed)
             if 0 <= other <= body or (is_pair_of_moving and not contact.between_bodies):

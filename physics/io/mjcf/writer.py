@@ -17,10 +17,12 @@ from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
+from physics.scene.groups import assign_groups, touching_pairs
 from physics.scene.scene import Scene
 
 GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
 KEYFRAME = "start"
+MOST_BITS = 2**30  # MuJoCo's masks are integers of 32 bits with a sign
 
 
 def unnamed(b: int) -> str:
@@ -62,22 +64,21 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
     _add_meshes(root, scene)
     world = ET.SubElement(root, "worldbody")
-    frictions = Frictions(scene)
+    frictions, touch = Frictions(scene), _masks(scene)
     pairs = list(frictions.exceptions())
     for k, wall in enumerate(scene.walls):
         name = wall.name or (unnamed_wall(k) if pairs else None)
         named: Any = {} if name is None else {"name": name}
-        touch: Any = {"contype": "0", "conaffinity": "1" if scene.effect(Contact) else "0"}
         place: Any = {"pos": _text(wall.offset * np.array(wall.normal)), "zaxis": _text(wall.normal), "size": "0 0 1"}
         surface = _surface(frictions.walls[k], frictions)
-        ET.SubElement(world, "geom", **named, type="plane", **place, **touch, **surface)
+        ET.SubElement(world, "geom", **named, type="plane", **place, **touch[len(scene.bodies) + k], **surface)
     springs = [effect for effect in scene.effects if isinstance(effect, Spring)]
     _check_names(scene)
     for b, body in enumerate(scene.bodies):
         surface = _surface(frictions.bodies[b], frictions)
         if pairs:
             surface["name"] = geom_name(b)
-        _add_body(world, b, body, scene.effect(Contact), surface, springs)
+        _add_body(world, b, body, touch[b], surface, springs)
     if pairs:
         _add_pairs(root, scene, pairs)
     if springs:
@@ -144,10 +145,42 @@ def _surface(mu: float, frictions: Frictions) -> dict[str, str]:
     return {"condim": "3" if mu > 0 else "1", "friction": _text((mu, 0, 0))}
 
 
-def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface: dict, springs: list[Spring]) -> None:
+def _masks(scene: Scene) -> list[dict[str, str]]:
+    """Attributes `contype` and `conaffinity` of the geoms of all bodies, then of all walls.
+
+    In MuJoCo two geoms touch if the one mask of either has a bit of the other mask of the other. With a bit for each
+    kind of geom, and both masks symmetric, that says the same as groups.
+
+    Raises
+    ------
+    ValueError
+        There are more kinds than bits.
+    """
+    contact = scene.effect(Contact)
+    if contact is None:
+        return [{"contype": "0", "conaffinity": "0"}] * (len(scene.bodies) + len(scene.walls))
+    of_still, of_moving = {"contype": "0", "conaffinity": "1"}, {"contype": "1"}
+    of_moving["conaffinity"] = str(int(contact.between_bodies))
+    touching = touching_pairs(scene, contact.between_bodies)
+    if touching is None:
+        return [of_still if body.fixed else of_moving for body in scene.bodies] + [of_still] * len(scene.walls)
+    count, total = touching.shape
+    every = np.zeros((total, total), bool)
+    every[:count] = touching
+    for b, body in enumerate(scene.bodies):  # as another body of its kind
+        every[b, b] = contact.between_bodies and not body.fixed and bool(body.group & body.mask)
+    found = assign_groups(every | every.T)
+    if found is None or max(group for group, _ in found) > MOST_BITS:
+        raise ValueError(
+            "Scene has bodies and walls of more than 31 kinds, each of which touches others; allowed in MJCF are 31"
+        )
+    return [{"contype": str(group), "conaffinity": str(mask)} for group, mask in found]
+
+
+def _add_body(world: ET.Element, b: int, body, touch: dict, surface: dict, springs: list[Spring]) -> None:
     """Add the element of body number `b` in the frame of the scene's body, and sites for its springs.
 
-    A fixed body has no joint, and touches the others as a plane does.
+    `touch` holds the masks of its geom. A fixed body has no joint.
     """
     element = ET.SubElement(world, "body", name=body.name or unnamed(b), pos=_text(body.pos), quat=_text(body.quat))
     if not body.fixed:
@@ -158,12 +191,6 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
     shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
-    touch: Any = {
-        "contype": str(int(contact is not None)),
-        "conaffinity": str(int(bool(contact and contact.between_bodies))),
-    }
-    if body.fixed:
-        touch = {"contype": "0", "conaffinity": str(int(contact is not None))}
     ET.SubElement(element, "geom", **shape, **touch, **surface)
     for k, spring in enumerate(springs):
         if spring.body == b:

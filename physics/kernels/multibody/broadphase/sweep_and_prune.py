@@ -16,6 +16,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.grid import body_strips, fill_columns
 from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
+from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 from physics.kernels.multibody.data.fixed_bodies import may_form_pair
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
@@ -50,13 +51,15 @@ def surface_motion_bound(b, h, many):
 def may_reach_wall(b, wall, h, many):
     """True if the bounding sphere of body b may touch a wall within h [s]; `wall` is the wall's index.
 
-    Rotation does not move the sphere, so that a body that spins fast far from the wall does not count.
+    False if their collision groups keep them apart. Rotation does not move the sphere, so that a body that spins fast
+    far from the wall does not count.
     """
     d = (
         qt.dot(row_vector(many.walls, wall, WALL_NORMAL), row_vector(many.bodies.state, b, POS))
         - many.walls[wall, WALL_OFFSET]
     )
-    return not d > many.bodies.body[b].radius + center_motion_bound(b, h, many) + many.bodies.body[b].slop
+    near = not d > many.bodies.body[b].radius + center_motion_bound(b, h, many) + many.bodies.body[b].slop
+    return near and share_group(b, -1 - wall, many)
 
 
 @inlined
@@ -171,7 +174,7 @@ def _pair_in_column(a, i, j, axes, cuts, count, many):
         b = many.broadphase.entry[k]
         if box[b, axis] > box[a, axis + 3]:
             break
-        if not (_overlap(a, b, many) and may_form_pair(a, b, many)):
+        if not (_overlap(a, b, many) and may_form_pair(a, b, many) and share_group(a, b, many)):
             continue
         a_i, _, a_j, _ = body_strips(a, u, v, cuts, many)
         b_i, _, b_j, _ = body_strips(b, u, v, cuts, many)

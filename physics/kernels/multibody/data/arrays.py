@@ -103,6 +103,7 @@ class Bodies(NamedTuple):
     spin_bound: np.ndarray  # (bodies,) bound of |ω| if the body may turn far in this stage, else 0 [rad/s]
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
+    groups: np.ndarray | None  # (bodies + walls, 2) int, group and mask of each; None in a world where all may touch
 
 
 class BroadPhase(NamedTuple):

@@ -17,6 +17,7 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data.arrays import LOADED_MOMENTA, PRE_LOAD_VELOCITY
+from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
@@ -147,7 +148,7 @@ def free_lift_work(b, many):
 
 @kernel
 def clamp_body_inside_walls(b, many):
-    """Move body b back inside if its geometric centre is behind a wall; return whether it was.
+    """Move body b back inside if its geometric centre is behind a wall that it may touch; return whether it was.
 
     The velocity into the wall is removed, too. Contacts hold points of a body, not its centre. Loads of a million times
     the weight may turn a body by many radians in a step, and its points then do not show where the centre goes.
@@ -157,7 +158,7 @@ def clamp_body_inside_walls(b, many):
     for k in range(many.walls.shape[0]):
         n, center = row_vector(many.walls, k, WALL_NORMAL), row_vector(many.bodies.center, b, 0)
         d = qt.dot(n, center) - many.walls[k, WALL_OFFSET]
-        if d >= 0.0:
+        if d >= 0.0 or not share_group(b, -1 - k, many):
             continue
         was_outside = True
         reach = body.radius

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 import physics
+from physics.scene.groups import group_table
 from physics.work_precision.contender import TooSlow
 from physics.work_precision.errors import mechanical_energy
 
@@ -167,5 +168,13 @@ def gravity(scene: physics.Scene) -> tuple[float, float, float]:
 
 
 def walls(scene: physics.Scene) -> tuple[physics.HalfSpace, ...]:
-    """Walls of the scene; empty without contact."""
+    """Walls of the scene; empty without contact.
+
+    Raises
+    ------
+    Unsupported
+        Some bodies or walls have collision groups of their own.
+    """
+    if group_table(scene) is not None:
+        raise Unsupported("collision groups are not handed to this engine")
     return tuple(scene.walls) if scene.effect(physics.Contact) else ()
