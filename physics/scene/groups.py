@@ -80,17 +80,17 @@ def potential_pairs(scene: Scene, between_bodies: bool) -> np.ndarray:
 
 
 def assign_groups(touching: np.ndarray) -> list[tuple[int, int]] | None:
-    """Find a group and a mask for each of n bodies or walls, so that those touch that shall.
+    """Find a group and a mask for each of n bodies or walls under which exactly the wanted pairs touch.
 
     Parameters
     ----------
     touching : (n, n) bool
-        Whether two of them shall touch; symmetric.
+        True for a pair that shall touch; symmetric.
 
     Returns
     -------
     list of (group, mask), or None
-        Those with the same row share a group. None if there are more kinds of rows than bits, 32.
+        Bodies and walls with equal rows share a group. None if there are more kinds of rows than bits, 32.
     """
     _, kind = np.unique(touching, axis=0, return_inverse=True)
     kind = kind.ravel()  # some releases of NumPy keep the axis

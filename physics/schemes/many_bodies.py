@@ -32,7 +32,7 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed bodies, and for hulls and spring-tied bodies at walls.
+    """Scheme for bodies that touch each other or fixed bodies; at walls for hulls, spring-tied bodies and groups.
 
     Parameters
     ----------

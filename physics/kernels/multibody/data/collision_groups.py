@@ -1,4 +1,4 @@
-"""Collision groups in kernels: which two ends of a contact may touch, by bits. Left out of scenes where all may."""
+"""Collision groups in kernels: bit masks decide which bodies and walls may touch. Scenes without groups lack them."""
 
 from __future__ import annotations
 
