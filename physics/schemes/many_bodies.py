@@ -31,7 +31,9 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed ones; also for hulls at walls, and bodies tied by springs there.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls and capsules at walls.
+
+    Bodies at walls that are tied by springs are stepped here, too.
 
     Parameters
     ----------
@@ -48,7 +50,7 @@ class ManyBodies(Scheme):
 
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
-        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls)
+        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls or needs.capsules)
         return (is_coupled or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
@@ -56,7 +58,8 @@ class ManyBodies(Scheme):
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, fixed bodies and Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, capsules, fixed bodies and Spring "
+                "between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
@@ -65,6 +68,7 @@ class ManyBodies(Scheme):
         fixed = np.array([body.fixed for body in scene.bodies], np.int64) if switches.fixed else None
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
+            capsules=switches.capsules,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,

@@ -101,6 +101,7 @@ def make_bodies_workspace(
     polyhedra: Sequence = (),
     fixed: np.ndarray | None = None,
     *,
+    capsules: bool | None = None,
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     **settings: float,
 ) -> BodiesWorkspace:
@@ -118,6 +119,8 @@ def make_bodies_workspace(
         The bodies as `make_hulls` takes them; empty if the world has no hulls.
     fixed : array (bodies,) int64, optional
         1 for each fixed body, 0 for others; copied. None: no body is fixed.
+    capsules : True or None
+        Whether some bodies are capsules.
     materials : tuple of two
         Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
         bodies, None: the default rules.
@@ -127,7 +130,7 @@ def make_bodies_workspace(
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed),
+        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, capsules),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -148,6 +151,7 @@ def _make_bodies(
     materials: WallMaterials | None,
     relative_slop: float,
     fixed: np.ndarray | None,
+    capsules: bool | None,
 ) -> Bodies:
     records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
@@ -168,6 +172,7 @@ def _make_bodies(
         spin_bound=np.zeros(bodies),
         lift_work=np.zeros(bodies),
         fixed=None if fixed is None else fixed.copy(),
+        capsules=capsules,
     )
 
 

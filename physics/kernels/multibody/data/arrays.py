@@ -103,6 +103,7 @@ class Bodies(NamedTuple):
     spin_bound: np.ndarray  # (bodies,) bound of |ω| if the body may turn far in this stage, else 0 [rad/s]
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
+    capsules: bool | None  # None in a world without capsules
 
 
 class BroadPhase(NamedTuple):

@@ -22,6 +22,7 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.contact_set import (
     DEEP_SHARE,
     FEATURES_PER_PAIR,
@@ -161,7 +162,10 @@ def _holds_point(b, p, thinner, hulls, many):
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             return _hull_holds_point(b, p, thinner, many)
-    if shape == SPHERE:
+    if is_capsule(b, many):
+        y = half_length(b, many)
+        p = (p[0], p[1] - min(max(p[1], -y), y), p[2])
+    if shape == SPHERE or is_capsule(b, many):
         return qt.dot(p, p) < (d[0] - thinner) ** 2
     d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)
     if shape == BLOCK:
