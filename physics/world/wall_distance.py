@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from physics.kernels.half_space.gap_queries import deepest_gaps
@@ -17,6 +19,18 @@ def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np
         R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
         centres = centres + np.einsum("kij,kj->ki", R, params[:, at.CENTER : at.CENTER + 3])
     return centres
+
+
+def lowest_reach(body: Any, quat: np.ndarray, dimensions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Lowest coordinate (k, walls) of a hull or capsule along each wall's normal, from its centre, in k poses [m].
+
+    `quat` (k, 4) are attitudes, `dimensions` (k, 3) half extents [m], and `normals` (walls, 3) unit vectors.
+    """
+    R = rotation_matrices(quat)
+    if body.kind == "hull":
+        return np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+    radius, half = dimensions[:, :1], dimensions[:, 1:2] - dimensions[:, :1]
+    return -half * np.abs(R[:, :, 1] @ normals.T) - radius
 
 
 def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -41,10 +55,10 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
     if len(world.walls):
         normals, offsets = world.walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], world.walls[:, at.WALL_OFFSET]
         for b, body in enumerate(world.scene.bodies):
-            if body.kind == "hull":
+            if body.kind in ("hull", "capsule"):
                 own = state[b :: world.body_count]
-                R = rotation_matrices(own[:, at.QUAT : at.QUAT + 4])
-                reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+                sizes = params[b :: world.body_count, at.DIMENSIONS : at.DIMENSIONS + 3]
+                reach = lowest_reach(body, own[:, at.QUAT : at.QUAT + 4], sizes, normals)
                 each = own[:, at.POS : at.POS + 3] @ normals.T - offsets + reach
                 gaps[b :: world.body_count] = each.min(axis=1)
                 which[b :: world.body_count] = each.argmin(axis=1)

@@ -308,6 +308,8 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
         other = next((f"size{place}" for place in ("", f"[{index}]") if f"size{place}" in distributions), None)
         if kind == "radius" and other:
             raise ValueError(f"draws of {task} has {other!r} and {name!r} of body {index}; allowed is one of the two")
+        told = f"draws {name} of {task} is {distributions[name]!r}, and body {index} is a {type(bodies[index]).__name__}"
         if kind == "size" and is_sphere and is_elementwise(distributions[name]):
-            told = f"draws {name} of {task} is {distributions[name]!r}, and body {index} is a Sphere, of one diameter"
-            raise ValueError(f"{told}; allowed is 'radius[{index}]' with a number, a pair or a distribution")
+            raise ValueError(f"{told}, of one diameter; allowed is 'radius[{index}]' with a number, a pair or a distribution")
+        if kind == "size" and bodies[index].kind == "capsule" and is_elementwise(distributions[name]):
+            raise ValueError(f"{told}, of two equal diameters; allowed is Choice([...]) of whole sizes")

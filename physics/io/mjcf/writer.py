@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from physics.io.mjcf.capsule_frames import OF_GEOM
 from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
 from physics.scene.scene import Scene
 
-GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
+GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule"}
 KEYFRAME = "start"
 
 
@@ -157,6 +158,8 @@ def _add_body(world: ET.Element, b: int, body, contact: Contact | None, surface:
         ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
+    if body.kind == "capsule":
+        extent = {"size": _text((body.radius, 0.5 * body.length)), "quat": _text(OF_GEOM)}
     shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
     touch: Any = {
         "contype": str(int(contact is not None)),

@@ -55,12 +55,17 @@ def collide_capsule_wall(b, wall, margin, h, many):
 
 
 @inlined
-def direction_between(p, q, u):
-    """Distance of two points, and the unit vector from q to p; one across the direction u if they coincide."""
+def direction_between(p, q, u, v):
+    """Distance of two points, and the unit vector from q to p; if they coincide, one across both directions u and v."""
     d = minus(p, q)
     size = math.sqrt(qt.dot(d, d))
     if size > 0.0:
         return size, (d[0] / size, d[1] / size, d[2] / size)
+    n = qt.cross(u, v)
+    square = qt.dot(n, n)
+    if square > 0.0:
+        s = 1.0 / math.sqrt(square)
+        return size, (s * n[0], s * n[1], s * n[2])
     s = 1.0 / math.sqrt(qt.dot(u, u))
     return size, tangent_basis((s * u[0], s * u[1], s * u[2]))[0]
 
@@ -73,7 +78,7 @@ def collide_capsule_sphere(capsule, ball, a, b, margin, h, many):
     """
     x, p, u = row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, capsule, 0), half_axis(capsule, many)
     q = point_on_segment(p, u, nearest_place(x, p, u))
-    distance, n = direction_between(x, q, u)
+    distance, n = direction_between(x, q, u, u)
     r, R = many.bodies.body[ball].dims[0], many.bodies.body[capsule].dims[0]
     gap = distance - r - R
     if gap <= margin:
@@ -83,7 +88,7 @@ def collide_capsule_sphere(capsule, ball, a, b, margin, h, many):
 @inlined
 def _add_balls(a, b, feature, p, q, margin, h, many):
     """Add the contact of the balls of capsules a and b about the points p and q of their axes, if it is near enough."""
-    distance, n = direction_between(p, q, half_axis(b, many))
+    distance, n = direction_between(p, q, half_axis(a, many), half_axis(b, many))
     one, other = many.bodies.body[a].dims[0], many.bodies.body[b].dims[0]
     gap = distance - one - other
     if gap <= margin:
