@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from scipy.optimize import lsq_linear
+from scipy.optimize import brentq, lsq_linear, minimize_scalar
 
 import physics
 from physics.rotations import rotation_matrices
@@ -36,6 +36,33 @@ def gap_of_capsule(capsule: physics.Capsule, other: physics.Capsule) -> float:
     """Gap of two capsules [m]."""
     (x, u), (y, v) = axis_of(capsule), axis_of(other)
     return _least_distance([u, -v], y - x, [1, 1]) - capsule.radius - other.radius
+
+
+def _distance_to_ellipsoid(y, semi_axes) -> float:
+    """Distance of a point outside from an ellipsoid, in its frame, 0 inside.
+
+    The nearest point has the coordinates a² y/(t + a²), for the root t > 0 of Σ (a y/(t + a²))² = 1.
+    """
+    squares = np.asarray(semi_axes) ** 2
+
+    def excess(t):
+        return float(np.sum(squares * (y / (t + squares)) ** 2)) - 1.0
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    t = brentq(excess, 0.0, np.linalg.norm(y) * max(semi_axes) + 1.0, xtol=1e-15, rtol=1e-15)
+    return float(np.linalg.norm(y - squares * y / (t + squares)))
+
+
+def gap_of_ellipsoid(capsule: physics.Capsule, ball: physics.Ellipsoid) -> float:
+    """Gap of a capsule and an ellipsoid whose inside holds no point of the axis [m]."""
+    (x, u), R = axis_of(capsule), rotation_matrices(np.array(ball.quat))
+
+    def distance(s):
+        return _distance_to_ellipsoid((x + s * u - np.array(ball.pos)) @ R, ball.semi_axes)
+
+    inner = minimize_scalar(distance, bounds=(-1, 1), method="bounded", options={"xatol": 1e-12}).fun
+    return min(inner, distance(-1.0), distance(1.0)) - capsule.radius
 
 
 def axis_as_polyhedron(capsule: physics.Capsule) -> Posed:
