@@ -44,8 +44,8 @@ class Plan(Switches):
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
-            self.hulls, self.capsules, self.sleeping, self.fixed, self.features, self.material_columns > 0, self.walls_differ,
-            self.pair_materials, *self.laws,
+            self.hulls, self.capsules, self.sleeping, self.fixed, self.features, self.material_columns > 0,
+            self.walls_differ, self.pair_materials, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
 

@@ -238,8 +238,8 @@ class Scene:
             unknown = [type(each).__name__ for each in fields if each.needs_axes and is_without_axes]
             if unknown:
                 raise ValueError(
-                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a {body.kind}; allowed with it are "
-                    "blocks, spheres and ellipsoids: it depends on what their surface is like"
+                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a {body.kind}; allowed with "
+                    "it are blocks, spheres and ellipsoids: it depends on what their surface is like"
                 )
         if fields and all(each.is_air for each in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
@@ -274,5 +274,7 @@ def _frames_of_package() -> int:
 
 
 def _names(allowed: Any) -> str:
-    kinds = {Body: (Block, Sphere, Ellipsoid, Capsule, Hull)}.get(allowed, allowed if isinstance(allowed, tuple) else (allowed,))
+    kinds = allowed if isinstance(allowed, tuple) else (allowed,)
+    if allowed is Body:
+        kinds = (Block, Sphere, Ellipsoid, Capsule, Hull)
     return ", ".join(kind.__name__ for kind in kinds)

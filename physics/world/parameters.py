@@ -218,7 +218,7 @@ def _check_capsules(halves) -> None:
     bad = np.flatnonzero((halves[:, 0] != halves[:, 2]) | ~(halves[:, 1] > halves[:, 0]))
     if len(bad):
         size = (2 * halves[bad[0]]).tolist()
-        raise ValueError(f"size is {size} for a capsule; allowed are diameter, a larger whole length, the same diameter")
+        raise ValueError(f"size is {size} for a capsule; allowed are diameter, a larger length, the diameter again")
 
 
 def _check_hull(b, body, halves) -> None:

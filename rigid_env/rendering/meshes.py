@@ -131,7 +131,7 @@ def capsule_mesh(dimensions, subdivisions=SPHERE_SUBDIVISIONS):
     radius, half = dimensions[0], dimensions[1] - dimensions[0]
     ball = ellipsoid_mesh((radius, radius, radius), subdivisions)
     vertices, count = ball.vertices, len(ball.vertices)
-    upper, is_upper_face = vertices + (0.0, half, 0.0), ball.centres[:, 1] > 0.0
+    lift, is_upper_face = np.array([0.0, half, 0.0]), ball.centres[:, 1] > 0.0
     faces = np.where(is_upper_face[:, None], ball.faces, ball.faces + count)
     middle, sides = 2 * count, []
     for face in ball.faces[is_upper_face].tolist():
@@ -139,7 +139,7 @@ def capsule_mesh(dimensions, subdivisions=SPHERE_SUBDIVISIONS):
             if vertices[a, 1] == 0.0 == vertices[b, 1]:
                 for high, low in ((0, middle), (middle, count)):
                     sides += [(b + high, a + high, a + low), (b + high, a + low, b + low)]
-    return _used(np.concatenate([upper, vertices - (0.0, half, 0.0), vertices]), np.concatenate([faces, sides]))
+    return _used(np.concatenate([vertices + lift, vertices - lift, vertices]), np.concatenate([faces, sides]))
 
 
 def _used(vertices, faces):

@@ -66,7 +66,7 @@ def drawn_capsule(rng, reach=1.5):
 @settings(max_examples=150, deadline=None)
 @given(seed=seeds, swaps=st.booleans())
 def test_the_least_gap_to_a_block_is_the_distance(seed, swaps):
-    """Where the axis passes through the block, the gap is the shortest way out, along a face or an edge."""
+    """Expect the shortest way out, along a face or an edge, of a capsule whose axis passes through the block."""
     rng = np.random.default_rng(seed)
     capsule, block = drawn_capsule(rng), physics.Block(rng.uniform(0.2, 2.0, 3), 1.0, **drawn_pose(rng, 0.5))
     gaps, normals, _, _ = contacts(*((block, capsule) if swaps else (capsule, block)))
@@ -83,7 +83,8 @@ def test_the_least_gap_to_a_block_is_the_distance(seed, swaps):
 def test_the_least_gap_to_a_hull_is_the_distance(seed):
     rng = np.random.default_rng(seed)
     capsule = drawn_capsule(rng)
-    hull = physics.Hull(rng.normal(size=(rng.integers(4, 12), 3)) * rng.uniform(0.3, 1.0, 3), 1.0, **drawn_pose(rng, 0.5))
+    points = rng.normal(size=(rng.integers(4, 12), 3)) * rng.uniform(0.3, 1.0, 3)
+    hull = physics.Hull(points, 1.0, **drawn_pose(rng, 0.5))
     gaps, _, _, _ = contacts(capsule, hull)
     axis, solid = axis_as_polyhedron(capsule), posed(hull, hull.pos, hull.quat)
     apart = separation(axis, solid)

@@ -15,7 +15,14 @@ import physics
 from physics.io.mjcf.files import from_mjcf
 from physics.io.mjcf.writer import to_mjcf
 from physics.work_precision.errors import deepest_penetration
-from tests.reference.capsules import Tipping, axis_as_polyhedron, axis_of, gap_of_block, gap_of_capsule, gap_of_ellipsoid
+from tests.reference.capsules import (
+    Tipping,
+    axis_as_polyhedron,
+    axis_of,
+    gap_of_block,
+    gap_of_capsule,
+    gap_of_ellipsoid,
+)
 from tests.reference.polyhedra_distance import posed, separation
 
 pytestmark = pytest.mark.interpreted
@@ -272,8 +279,8 @@ def test_rays_along_the_axis_and_across_it(direction):
     origin = -9.0 * np.array(direction)
     reach = 1.5 if direction[1] else 0.5
     assert world.cast_rays(origin, direction).distance[0, 0] == pytest.approx(9 - reach, abs=EXACT)
-    beside = origin + (0, 0, 0.6) if direction[2] == 0 else origin + (0.6, 0, 0)
-    assert np.isinf(world.cast_rays(beside, direction).distance).all()
+    aside = np.array([0, 0, 0.6] if direction[2] == 0 else [0.6, 0, 0])
+    assert np.isinf(world.cast_rays(origin + aside, direction).distance).all()
 
 
 def test_a_capsule_is_a_shape_for_queries_of_a_scene_without_one():

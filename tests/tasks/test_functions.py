@@ -241,18 +241,18 @@ def test_sizes_that_a_body_cannot_have_are_refused(draws, words):
 
 
 def test_sizes_of_a_capsule_are_whole_sizes():
-    """Two of three numbers are equal: they cannot be drawn each by itself, but as one of several sizes."""
+    """Two of three numbers are equal: they cannot be drawn one by one, but whole sizes can."""
 
     class Rod(Free):
         scene = physics.Scene([physics.Capsule(0.5, 1.0, 3.0)])
         draws = {"size": Choice([(1.0, 2.0, 1.0), (0.6, 3.0, 0.6)]), "goal": (-1.0, 1.0)}  # noqa: RUF012
 
-    task = Rod(8)
-    task.reset(seed=0)
-    sizes = 2.0 * task.world.params[:, at.DIMENSIONS : at.DIMENSIONS + 3]
+    envs = TaskVectorEnv(8, task=Rod)
+    envs.reset(seed=0)
+    sizes = 2.0 * envs.task.world.params[:, at.DIMENSIONS : at.DIMENSIONS + 3]
     assert {tuple(size) for size in sizes.round(9).tolist()} == {(1.0, 2.0, 1.0), (0.6, 3.0, 0.6)}
     rods = [physics.Capsule(0.5 * d, whole - d, 3.0) for d, whole, _ in sizes.tolist()]
-    np.testing.assert_allclose(1.0 / task.world.params[:, at.INV_INERTIA], [rod.inertia[0, 0] for rod in rods])
+    np.testing.assert_allclose(1.0 / envs.task.world.params[:, at.INV_INERTIA], [rod.inertia[0, 0] for rod in rods])
     drawn = {"size": ((1.0, 2.0, 1.0), (1.2, 3.0, 1.2))}
     with pytest.raises(ValueError, match="body 0 is a Capsule, of two equal diameters; allowed is Choice"):
         type("Rod", (Rod,), {"draws": drawn})()

@@ -161,7 +161,7 @@ SCENES = rows(
     ("spring-to-nobody", lambda: scene(p.Spring(body=9)), ("Spring.body is 9", "indices below 1")),
     ("axis-is-normal", lambda: scene(p.Contact(), p.Friction((1, 2), (0, 1, 0))), ("axis is [0.0, 1.0", "along")),
     ("axes-too-few", lambda: scene(p.Contact(), p.Friction((1, 2), ((1, 0, 0),) * 2)), ("Friction.axis has 2", "or 3")),
-    ("drag-of-a-capsule", lambda: p.Scene(p.Capsule(1, 1, 1), [], p.Drag()), ("Drag", "bodies[0] is a capsule", "block")),
+    ("drag-of-a-capsule", lambda: p.Scene(p.Capsule(1, 1, 1), [], p.Drag()), ("Drag", "bodies[0] is a capsule")),
     ("drag-of-a-hull", lambda: p.Scene(p.Hull(TETRAHEDRON, 1), [], p.Drag()), ("Drag", "bodies[0] is a hull", "block")),
     ("effect-by-name", lambda: scene().effect("Gravity"), ("kind is 'Gravity'", "the class of an effect")),
     ("scene-keyword", lambda: p.Scene([ball()], efects=[]), ("'efects' (given: [])", "allowed are effects,")),

@@ -25,4 +25,3 @@ def capsule_frame(quat: np.ndarray) -> np.ndarray:
 def capsule_extents(size: np.ndarray) -> np.ndarray:
     """Half extents (3,) [m] of a scene's capsule from MuJoCo's radius and half-length of the cylinder."""
     return np.array([size[0], size[1] + size[0], size[0]])
-

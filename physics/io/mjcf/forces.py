@@ -88,7 +88,10 @@ def damping(model: Model, free: list[BodyElements], left: LeftOut) -> list[Any]:
         return [Drag(0.0, linear=first[0]), AngularDrag(first[0])]
     for joint, value in found.items():
         if value.any():
-            allowed = "allowed is one number for all bodies, whose joints are at their centres of mass, without meshes and capsules"
+            allowed = (
+                "allowed is one number for all bodies, whose joints are at their centres of mass, without meshes and "
+                "capsules"
+            )
             left.add(model.error("joint", joint, f"has damping {m.dof_damping[m.jnt_dofadr[joint]]:g}; {allowed}"))
     return []
 

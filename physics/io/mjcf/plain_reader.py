@@ -282,7 +282,9 @@ def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray
     geom, kind = geoms[0], _type(geoms[0])
     if kind not in SHAPES:
         raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
-    _refuse(geom, *(() if kind == "capsule" else ("quat",)), "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    _refuse(geom, "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    if kind != "capsule":
+        _refuse(geom, "quat")
     return geom, kind, _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
 
 

@@ -102,7 +102,7 @@ def uniform_moments(kind: str, shape: np.ndarray, mass: float) -> np.ndarray:
 
 
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:
-    """Make a box, sphere, ellipsoid or capsule; `inertia_body` is given if the inertia is not that of uniform density."""
+    """Make a body that is no hull; `inertia_body` is given if the inertia is not that of uniform density."""
     half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
     is_uniform = _is_near(placed.mass.inertia, np.diag(uniform_moments(placed.kind, half, mass)), UNIFORM)
     if (is_uniform or placed.kind != "box") and _is_rounding(arm, placed):

@@ -22,7 +22,7 @@ STATE_SIZE = 16
 INV_MASS = 0  # [1/kg]
 INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
 DIMENSIONS = (
-    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, reach of a hull or capsule [m]
+    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, else half extents [m]
 )
 RADIUS = 7  # of the bounding sphere about the centre of mass [m]
 FRICTION = 8  # Coulomb coefficient against the walls

@@ -331,7 +331,8 @@ def _carried_point(b, k, first, side, n, many):
     """Arm of body b in contact k after its motion since the contact was found, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
-    contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the body's anchor; `side` is -1 for the first body and 1 for the second.
+    contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
+    body's anchor; `side` is -1 for the first body and 1 for the second.
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:

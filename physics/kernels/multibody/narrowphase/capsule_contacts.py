@@ -1,8 +1,8 @@
 """Contacts of a capsule with a wall, a sphere, another capsule and an ellipsoid.
 
-A capsule touches with balls about points of its axis. Every contact is that of such a ball: of an end of the axis, or of
-the point at which the axis passes another body. So a capsule that lies on something has two contacts, and each of them
-has the gap and the normal of its own ball.
+A capsule touches with balls about points of its axis. Every contact is that of such a ball: of an end of the axis, or
+of the point at which the axis passes another body. So a capsule that lies on something has two contacts, and each of
+them has the gap and the normal of its own ball.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ def collide_capsule_sphere(capsule, ball, a, b, margin, h, many):
 
     Their gap is at most `margin` [m]; h is the length of the stage [s].
     """
-    x, p, u = row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, capsule, 0), half_axis(capsule, many)
+    center, u = many.bodies.center, half_axis(capsule, many)
+    x, p = row_vector(center, ball, 0), row_vector(center, capsule, 0)
     q = point_on_segment(p, u, nearest_place(x, p, u))
     distance, n = direction_between(x, q, u, u)
     r, R = many.bodies.body[ball].dims[0], many.bodies.body[capsule].dims[0]
