@@ -13,6 +13,7 @@ import physics
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
+from physics.kernels.multibody.stepping.passing_pairs import _gap_along
 from physics.plan.plan import SHAPE_CODES
 from physics.rotations import rotation_matrices
 from physics.scene.polyhedra import polyhedra
@@ -160,6 +161,19 @@ def test_axes_that_meet_are_parted_across_both(length):
     gaps, normals, _, _ = contacts(one, other, h=1e-3)
     assert gaps.min() == pytest.approx(-0.2)
     assert abs(normals[gaps.argmin()]) == pytest.approx((0, 1, 0))
+
+
+def test_bodies_that_pass_each_other_keep_the_balls_that_are_near():
+    """The farthest point of a capsule along a plane that parts two bodies may be at its other end, half a metre off."""
+    lower = physics.Capsule(0.1, 1.0, 1.0, quat=ALONG_X)
+    upper = physics.Capsule(0.1, 1.0, 1.0, pos=(0.2, 0.21, 0.3), quat=ALONG_Z)
+    _, normals, _, many = contacts(lower, upper, h=0.2)
+    turned = normals[0] + (0.1, 0, 0)
+    turned /= np.linalg.norm(turned)
+    gap, p, q = called(_gap_along, 0, tuple(turned.tolist()), None, many)
+    assert p == pytest.approx((0.2, 0, 0) - 0.1 * turned, abs=EXACT)
+    assert q == pytest.approx((0.2, 0.21, 0) + 0.1 * turned, abs=EXACT)
+    assert gap == pytest.approx((0, -0.21, 0) @ turned - 0.2, abs=EXACT)
 
 
 def test_a_sphere_touches_the_side_or_an_end():

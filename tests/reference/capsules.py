@@ -101,3 +101,42 @@ class Tipping:
 
         a = solve_ivp(rate, (0, time), (start, 0.0), method="DOP853", rtol=1e-13, atol=1e-14).y[0, -1]
         return np.array([r * (a - start) + l * np.sin(a), r + l * np.cos(a)]), float(a)
+
+
+@dataclass(frozen=True)
+class Rocking:
+    """A capsule rocks across a fixed one, in the plane across that one's axis, without slip.
+
+    Let a be the angle of the normal from the upward direction, R the radius of the fixed capsule, r that of the other.
+    The contact is R a from the middle of the rocking capsule. Its centre is then at
+
+        (R + r) (sin a, cos a) - R a (cos a, -sin a),
+
+    and moves at a' √(r² + R² a²). So the energy is
+
+        T + V = (m r² + m R² a² + I) a'²/2 + m g ((R + r) cos a + R a sin a),
+
+    from which Lagrange's equation follows. With r < R it oscillates.
+    """
+
+    fixed_radius: float
+    radius: float
+    mass: float
+    inertia: float  # across the axis, about the centre of mass [kg m²]
+    gravity: float
+
+    def place(self, a: float) -> np.ndarray:
+        """Centre (2,) at the angle a [m]."""
+        R, sine, cosine = self.fixed_radius, np.sin(a), np.cos(a)
+        return (R + self.radius) * np.array([sine, cosine]) - R * a * np.array([cosine, -sine])
+
+    def angle(self, start: float, time: float) -> float:
+        """Angle [rad] after `time`, from rest at the angle `start`."""
+        m, R, r, g = self.mass, self.fixed_radius, self.radius, self.gravity
+
+        def rate(_, y):
+            a, w = y
+            push = m * g * (R * a * np.cos(a) - r * np.sin(a)) + m * R * R * a * w * w
+            return w, -push / (self.inertia + m * r * r + m * R * R * a * a)
+
+        return float(solve_ivp(rate, (0, time), (start, 0.0), method="DOP853", rtol=1e-13, atol=1e-14).y[0, -1])

@@ -10,6 +10,7 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
+from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -349,8 +350,8 @@ def _carried_point(b, k, first, side, n, many):
 def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its bodies a and b; return its normal, world frame.
 
-    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres. Any
-    other normal stays as it is.
+    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres, and
+    that of two balls of capsules likewise. Any other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -362,6 +363,9 @@ def _turn_frame(k, a, b, many):
         if size > 0.0:
             n = (d[0] / size, d[1] / size, d[2] / size)
             write_contact_frame(k, n, many)
+    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
+        n = normal_between_axes(k, a, b, n, many)
+        write_contact_frame(k, n, many)
     return n
 
 

@@ -19,6 +19,7 @@ from physics.kernels.half_space.contact_point import ellipsoid_point_and_rate
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
+from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import (
     add_scaled,
@@ -135,6 +136,7 @@ def set_resting_targets(n, h, many):
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
+        t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
