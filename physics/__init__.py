@@ -24,6 +24,7 @@ from physics.keywords import no_attribute as _no_attribute
 from physics.plan.plan import make_plan
 from physics.scene import canonical_scenes as scenes
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.capsule import Capsule
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, field_function
 from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
@@ -53,6 +54,7 @@ __all__ = [
     "Block",
     "Body",
     "Buoyancy",
+    "Capsule",
     "Contact",
     "Contacts",
     "Diagnostics",

@@ -14,12 +14,13 @@ from typing import Any
 from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.capsule import Capsule
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
 from physics.scene.scene import HalfSpace, Scene
 from physics.summary import shown
 
-BODIES = (Block, Sphere, Ellipsoid, Hull)
+BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
 """Classes that each list of a scene may hold."""

@@ -37,8 +37,9 @@ def _contact_row(scene, contact) -> Row:
     if contact is not None and touching is not None and scene.walls and not touching[:, len(scene.bodies) :].any():
         return Row("wall contact", False, "groups keep all bodies from all walls", "")
     if contact is not None and scene.walls:
-        hulls = ", corners of hulls" if any(body.kind == "hull" for body in scene.bodies) else ""
-        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{hulls}, impacts, solver")
+        kinds = {body.kind for body in scene.bodies}
+        also = ", corners of hulls" * ("hull" in kinds) + ", ends of capsules" * ("capsule" in kinds)
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{also}, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
     reason = "not declared: the walls do not act" if scene.walls else "not declared"
@@ -48,7 +49,7 @@ def _contact_row(scene, contact) -> Row:
 def _between_row(scene, contact, many) -> Row:
     if many:
         kinds = {body.kind for body in scene.bodies}
-        also = "".join(f", {kind}s" for kind in ("ellipsoid", "hull") if kind in kinds)
+        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "hull") if kind in kinds)
         return Row(
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )

@@ -66,14 +66,14 @@ else:
     _Shape = object
 
 
-def _body_repr(body: Body) -> str:
+def body_repr(body: Body) -> str:
     """`repr` of a body, an expression that makes it again: the infinite mass of a fixed one is left out."""
     return fields_repr(body, omitted=("mass",) if body.fixed else ())
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body(_Shape):
-    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
+    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid`, `Capsule` or `Hull`.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Body(_Shape):
 
     def __post_init__(self) -> None:
         if type(self) is Body:
-            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
+            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid, Capsule and Hull")
         if not isinstance(self.fixed, (bool, np.bool_)):
             raise ValueError(f"fixed is {shown(self.fixed)}; allowed are True and False")
         self._set("fixed", bool(self.fixed))
@@ -213,7 +213,7 @@ class Block(Body):
     mass: float = FROM_DENSITY
     center: Vector = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -285,7 +285,7 @@ class Sphere(Body):
     radius: float
     mass: float = FROM_DENSITY
     kind = "sphere"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -350,7 +350,7 @@ class Ellipsoid(Body):
     semi_axes: Vector
     mass: float = FROM_DENSITY
     kind = "ellipsoid"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -426,7 +426,7 @@ class Hull(Body):
     mass: float = FROM_DENSITY
     kind = "hull"
 
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 

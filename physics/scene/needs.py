@@ -106,6 +106,11 @@ class Needs:
         """True if hulls can touch walls or other bodies."""
         return self.touching and "hull" in self.kinds
 
+    @property
+    def capsules(self) -> bool:
+        """True if capsules can touch walls or other bodies."""
+        return self.touching and "capsule" in self.kinds
+
 
 def is_isotropic(moments: np.ndarray) -> Any:
     """True (...) where the three `moments` (..., 3) of a body are equal to rounding: it needs no gyroscopic torque."""
@@ -165,7 +170,7 @@ def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool,
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
-    has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
+    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in scene.bodies)
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,
         LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,

@@ -71,6 +71,8 @@ class Switches:
         Whether ellipsoids are among bodies that can touch each other.
     hulls : True or None
         Whether hulls can touch walls or bodies.
+    capsules : True or None
+        Whether capsules can touch walls or bodies.
     sleeping : True or None
         Whether bodies may sleep.
     features : int
@@ -100,6 +102,7 @@ class Switches:
     grouped: bool | None
     ellipsoids: bool | None
     hulls: bool | None
+    capsules: bool | None
     sleeping: bool | None
     features: int
     fields: tuple[FieldSlot, ...]

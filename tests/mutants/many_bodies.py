@@ -39,6 +39,14 @@ BROADPHASE = [
 
 DATA = [
     _mutant(
+        "data-capsule",
+        "The contact point of a capsule is carried along by the body instead of staying below the axis.",
+        "data/contact_set.py",
+        "return add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm",
+        "return arm",
+        "physics/test_capsules.py::test_a_capsule_rolls_down_a_slope",
+    ),
+    _mutant(
         "data-arm",
         "The arm of a contact leads from its point to the centre of mass.",
         "data/contact_set.py",
@@ -96,6 +104,22 @@ NARROWPHASE = [
         "gap = d + qt.dot(n, r)",
         "gap = d - qt.dot(n, r)",
         "kernels/test_hulls.py::test_a_hull_touches_a_wall_with_the_corners_that_are_near",
+    ),
+    _mutant(
+        "narrowphase-capsule-edge",
+        "A capsule touches an edge only where the edge is nearer than any other point.",
+        "narrowphase/capsule_hull.py",
+        "if far > distance or",
+        "if far > 0.9 * distance or",
+        "kernels/test_capsules.py::test_a_capsule_over_an_edge_touches_it_whatever_rounding_does",
+    ),
+    _mutant(
+        "narrowphase-capsule-inside",
+        "The direction across an edge and the axis of a capsule counts beyond the normals of the edge's faces.",
+        "narrowphase/segment_polyhedron.py",
+        "if not qt.dot(left, u) * qt.dot(right, u) < 0.0:",
+        "if not qt.dot(left, u) * qt.dot(right, u) > 0.0:",
+        "kernels/test_capsules.py::test_the_least_gap_to_a_block_is_the_distance",
     ),
 ]
 

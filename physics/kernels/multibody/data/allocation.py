@@ -102,6 +102,7 @@ def make_bodies_workspace(
     fixed: np.ndarray | None = None,
     *,
     groups: np.ndarray | None = None,
+    capsules: bool | None = None,
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     **settings: float,
 ) -> BodiesWorkspace:
@@ -121,6 +122,8 @@ def make_bodies_workspace(
         1 for each fixed body, 0 for others; copied. None: no body is fixed.
     groups : array (bodies + walls, 2) int64, optional
         Collision group and mask of each body, then of each wall; copied. None: all may touch.
+    capsules : True or None
+        Whether some bodies are capsules.
     materials : tuple of two
         Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
         bodies, None: the default rules.
@@ -130,7 +133,7 @@ def make_bodies_workspace(
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups),
+        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -152,6 +155,7 @@ def _make_bodies(
     relative_slop: float,
     fixed: np.ndarray | None,
     groups: np.ndarray | None,
+    capsules: bool | None,
 ) -> Bodies:
     records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
@@ -173,6 +177,7 @@ def _make_bodies(
         lift_work=np.zeros(bodies),
         fixed=None if fixed is None else fixed.copy(),
         groups=None if groups is None else groups.copy(),
+        capsules=capsules,
     )
 
 

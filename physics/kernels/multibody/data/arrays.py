@@ -104,6 +104,7 @@ class Bodies(NamedTuple):
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
     groups: np.ndarray | None  # (bodies + walls, 2) int, group and mask of each; None in a world where all may touch
+    capsules: bool | None  # None in a world without capsules
 
 
 class BroadPhase(NamedTuple):

@@ -38,6 +38,7 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.sweep_and_prune import may_meet, may_reach_wall
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
+from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
 from physics.kernels.state.body import angular_velocity, read_state
@@ -127,6 +128,8 @@ def _support(b, R, k, hulls, many):
         if shape == HULL:
             e = qt.transposed_matvec(R, k)
             return qt.dot(e, hull_support_vertex(b, e, many))
+    if is_capsule(b, many):
+        return capsule_support(b, R, k, many)
     return support_of_vector(shape, (d[0], d[1], d[2]), R, k)
 
 

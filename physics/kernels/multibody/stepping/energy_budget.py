@@ -17,6 +17,7 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data.arrays import LOADED_MOMENTA, PRE_LOAD_VELOCITY
+from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.state import layout as at
@@ -162,7 +163,9 @@ def clamp_body_inside_walls(b, many):
             continue
         was_outside = True
         reach = body.radius
-        if body.shape != HULL:
+        if is_capsule(b, many):
+            reach = capsule_support(b, row_matrix(many.bodies.rotation, b), n, many)
+        elif body.shape != HULL:
             reach = geo.support(
                 body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.bodies.rotation, b), n)
             )

@@ -19,6 +19,8 @@ from physics.kernels.half_space.contact_point import ellipsoid_point_and_rate
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
+from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
+from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import (
     add_scaled,
     contact_velocity,
@@ -69,7 +71,8 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 def _centripetal(b, k, first, side, h, many):
     """Acceleration ω x ṙ of body b's point in contact k, world frame [m/s²].
 
-    It is 0 for a sphere, whose contact point stays under its centre. It is also 0 if the body turns by more than
+    It is 0 for a sphere, whose contact point stays under its centre, and that of the ball's centre for a capsule, whose
+    point stays under a point of its axis. It is also 0 if the body turns by more than
     `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end. `first` is the
     column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
@@ -81,7 +84,10 @@ def _centripetal(b, k, first, side, h, many):
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return qt.cross(w, rate)
-    return qt.cross(w, qt.cross(w, row_vector(many.contacts.arm, k, first)))
+    arm = row_vector(many.contacts.arm, k, first)
+    if is_capsule(b, many):
+        arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
+    return qt.cross(w, qt.cross(w, arm))
 
 
 @inlined
@@ -130,6 +136,7 @@ def set_resting_targets(n, h, many):
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
+        t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])

@@ -22,6 +22,7 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.contact_set import (
     DEEP_SHARE,
     FEATURES_PER_PAIR,
@@ -161,7 +162,10 @@ def _holds_point(b, p, thinner, hulls, many):
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             return _hull_holds_point(b, p, thinner, many)
-    if shape == SPHERE:
+    if is_capsule(b, many):
+        y = half_length(b, many)
+        p = (p[0], p[1] - min(max(p[1], -y), y), p[2])
+    if shape == SPHERE or is_capsule(b, many):
         return qt.dot(p, p) < (d[0] - thinner) ** 2
     d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)
     if shape == BLOCK:
@@ -209,15 +213,29 @@ def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
     return n, gap > 0.0
 
 
-@kernel
-def _gap_along(a, b, n, hulls, many):
-    """Gap of bodies a and b along the unit vector n out of b: (gap [m], nearest point of a, nearest point of b).
+@inlined
+def _point_along(k, b, first, n, hulls, many):
+    """Point of body b that reaches farthest along the unit vector n, world frame [m].
 
-    The points are in the world frame [m].
+    Of a capsule it is that of the ball with which it touches in contact k: the farthest end of its axis may be far from
+    the other body, and would turn the capsule. `first` is the column of the body's anchor.
     """
-    x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
-    p = support_point(a, x, row_matrix(many.bodies.rotation, a), (-n[0], -n[1], -n[2]), 0.0, hulls, many)
-    q = support_point(b, y, row_matrix(many.bodies.rotation, b), n, 0.0, hulls, many)
+    R = row_matrix(many.bodies.rotation, b)
+    if is_capsule(b, many):
+        arm = qt.matvec(R, row_vector(many.contacts.anchor, k, first))
+        return add_scaled(add_scaled(row_vector(many.bodies.state, b, 0), 1.0, arm), many.bodies.body[b].dims[0], n)
+    return support_point(b, row_vector(many.bodies.center, b, 0), R, n, 0.0, hulls, many)
+
+
+@kernel
+def _gap_along(k, n, hulls, many):
+    """Gap of the bodies a and b of contact k along the unit vector n out of b: (gap [m], point of a, point of b).
+
+    The points are the nearest ones, in the world frame [m].
+    """
+    a, b = _bodies_of(k, many)
+    p = _point_along(k, a, 0, (-n[0], -n[1], -n[2]), hulls, many)
+    q = _point_along(k, b, 3, n, hulls, many)
     return qt.dot(n, subtract(p, q)), p, q
 
 
@@ -299,7 +317,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     m, is_parted = _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:
         return False, to
-    gap, p, q = _gap_along(a, b, m, hulls, many)
+    gap, p, q = _gap_along(k, m, hulls, many)
     if not gap > pair_slop(a, b, many):
         return _depth_after(k, h, many) > DEEP_SHARE * thinner, to
     if _moves_as_foreseen(a, b, gap, n, h, many):
