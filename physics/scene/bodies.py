@@ -15,6 +15,7 @@ from physics.html_table import fields_table
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
+from physics.scene.motion import Motion, motion_of
 from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
 
 FROM_DENSITY: Any = None  # default of `mass`, replaced by density times volume when the body is made
@@ -93,12 +94,15 @@ class Body(_Shape):
     fixed : bool
         True: the body stays where it is, like a wall of this shape. Other bodies rest on it and hit it; no force moves
         it. Mass, density and inertia must be left out; the attribute `mass` is then infinite. Velocities must be 0.
+    motion : Motion, optional
+        Prescribed motion of a fixed body, such as ``Motion(spin=(0, 1, 0))``. With a table `pos` and `quat` become
+        those of its start.
 
     Raises
     ------
     ValueError
         A parameter out of range, not exactly one of mass and density, or a name without printable characters. A fixed
-        body with a mass, a density, an inertia, a velocity, or a `center` other than 0.
+        body with a mass, a density, an inertia, a velocity, or a `center` other than 0. A motion without `fixed`.
     """
 
     pos: Vector = (0.0, 0.0, 0.0)
@@ -111,6 +115,7 @@ class Body(_Shape):
     friction: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     restitution: float | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     fixed: bool = field(default=False, metadata=SHOWN_IF_GIVEN)
+    motion: Motion | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def _repr_html_(self) -> str:
@@ -122,6 +127,9 @@ class Body(_Shape):
         if not isinstance(self.fixed, (bool, np.bool_)):
             raise ValueError(f"fixed is {shown(self.fixed)}; allowed are True and False")
         self._set("fixed", bool(self.fixed))
+        self._set("motion", motion_of(self.motion))
+        if self.motion is not None:
+            self._check_motion(self.motion)
         if self.fixed:
             self._check_fixed()
         else:
@@ -137,6 +145,13 @@ class Body(_Shape):
         check_coefficients(self)
         if not self.fixed:
             self._check_range()
+
+    def _check_motion(self, motion: Motion) -> None:
+        """Raise a ValueError for a motion of a body that is not fixed; take the pose at the start of a table."""
+        if not self.fixed:
+            raise ValueError(f"motion is {shown(motion)} of a body that is not fixed; allowed is None, or fixed=True")
+        for name, value in motion.start_pose().items():
+            self._set(name, value)
 
     def _check_fixed(self) -> None:
         """Raise a ValueError for parameters that a fixed body must not have; set `mass` to infinity."""
@@ -225,6 +240,7 @@ class Block(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
             center: ArrayLike = ...,
         ) -> None: ...
 
@@ -297,6 +313,7 @@ class Sphere(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -362,6 +379,7 @@ class Ellipsoid(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -438,6 +456,7 @@ class Hull(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -51,6 +51,8 @@ class Needs:
     walls_differ, pair_materials : bool
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
+    motion_columns : int
+        Numbers of a body for its prescribed motion; 0 if no body has one.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -82,6 +84,7 @@ class Needs:
     material_columns: int
     walls_differ: bool
     pair_materials: bool
+    motion_columns: int
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -122,6 +125,7 @@ def find_needs(scene: Scene) -> Needs:
     touching = contact is not None and (bool(scene.walls) or meeting)
     axes = [principal_axes(body.inertia) for body in scene.bodies if not body.fixed]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
     return Needs(
@@ -131,13 +135,14 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
+        motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,
         isotropic=isotropic,
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
         uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
-        sleeping=touching and steady and scene.effect(Sleeping) is not None,
+        sleeping=touching and steady and not motion_columns and scene.effect(Sleeping) is not None,
         fields=fields,
         laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip

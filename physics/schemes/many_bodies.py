@@ -66,7 +66,7 @@ class ManyBodies(Scheme):
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

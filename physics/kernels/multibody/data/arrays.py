@@ -217,6 +217,15 @@ class PairMaterials(NamedTuple):
     restitution: np.ndarray  # (m,) coefficients of restitution of these pairs
 
 
+class DrivenBodies(NamedTuple):
+    """Prescribed motions of fixed bodies, and their part in contacts; see `driven_bodies`."""
+
+    columns: np.ndarray  # (bodies, ...) motion of each body, columns of `flight.prescribed_motion`
+    clock: np.ndarray  # (2,) time of the world at the start of the call, and now [s]
+    velocity: np.ndarray  # (contacts, 3) velocity of the second end, world frame; 0 unless it is driven [m/s]
+    target: np.ndarray  # (contacts, 3) during a solve: targets relative to the driven ends [m/s]
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -230,5 +239,6 @@ class BodiesWorkspace(NamedTuple):
     newton: Newton
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
     materials: PairMaterials | None  # None: the default rules, and no exceptions
+    driven: DrivenBodies | None  # None: the scene declares no motion
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

@@ -15,7 +15,6 @@ stands out by less is no obstacle.
 from __future__ import annotations
 
 from physics.compiler.decorators import inlined, kernel, shared_kernel
-from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
@@ -33,6 +32,7 @@ from physics.kernels.multibody.data.contact_set import (
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.driven_bodies import attitude_after
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
@@ -132,7 +132,7 @@ def _is_stopping(k, h, many):
 def _end_pose(b, h, gyroscopic, offset_frame, many):
     """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
     x, q, v, L = read_state(many.bodies.state, b)
-    R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
+    R = to_matrix(attitude_after(b, q, L, h, gyroscopic, offset_frame, many))
     x = add_scaled(x, h, v)
     if offset_frame is not None:
         x = add_scaled(x, 1.0, center_arm(R, many.bodies.body[b]))

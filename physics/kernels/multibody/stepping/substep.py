@@ -29,6 +29,7 @@ from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
 from physics.kernels.multibody.data.contact_set import smaller_radius
+from physics.kernels.multibody.data.driven_bodies import bind_driven_twists
 from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
@@ -95,6 +96,7 @@ def substep_world(
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, switches.flight.gyroscopic, switches.flight.offset_frame, many)
         update_poses_and_twists(switches.flight.offset_frame, many)
+        bind_driven_twists(start + (h - left), left, many)
         is_turning = write_spin_bounds(h, switches.flight.offset_frame, many)
         if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
             clear_spin_bounds(many)

@@ -1,0 +1,98 @@
+"""Blocks on bodies with a prescribed motion: exact ways on a line, and a sliding point on a turntable by DOP853."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+GRAVITY = 9.81
+
+# Step with which zeros of smooth functions are bracketed, as a share of the time that the user names.
+SCAN_SHARE = 1e-3
+
+
+def first_zero(f: Callable[[float], float], start: float, stop: float, step: float) -> float:
+    """First sign change of f in (start, stop], or `stop`; f(start) itself may be 0 up to rounding."""
+    t = start + 1e-9 * step
+    while t < stop:
+        later = min(t + step, stop)
+        if f(t) * f(later) < 0.0:
+            return float(brentq(f, t, later, xtol=1e-15, rtol=1e-15))
+        t = later
+    return stop
+
+
+@dataclass(frozen=True)
+class BlockOnBelt:
+    """A block on a support that moves along a line with a smooth velocity; friction carries it.
+
+    While it slips its acceleration is ±μ g. A slip ends where both velocities are equal. There it sticks if friction can
+    give the acceleration of the support, until it cannot any more; else it slips the other way.
+
+    Attributes
+    ----------
+    velocity, acceleration : callable
+        Of the support at a time [m/s, m/s²].
+    friction : float
+        Coefficient μ.
+    scale : float
+        Time over which the motion of the support changes [s].
+    """
+
+    velocity: Callable[[float], float]
+    acceleration: Callable[[float], float]
+    friction: float
+    scale: float
+
+    def state(self, t: float) -> tuple[float, float]:
+        """Way [m] and velocity [m/s] at time t of a block that starts at rest."""
+        most, step, now, x, v = self.friction * GRAVITY, self.scale * SCAN_SHARE, 0.0, 0.0, 0.0
+        sign = math.copysign(1.0, self.velocity(0.0))
+        sticks = self.velocity(0.0) == 0.0
+        while now < t:
+            if sticks:
+                stop = now
+                if abs(self.acceleration(now + 1e-9 * step)) <= most:
+                    stop = first_zero(lambda s: abs(self.acceleration(s)) - most, now, t, step)
+                x += self._way(now, stop)
+                now, v = stop, self.velocity(stop)
+                sign, sticks = math.copysign(1.0, self.acceleration(min(stop + 1e-3 * step, t))), False
+                continue
+            start, speed, a = now, v, sign * most
+            stop = first_zero(lambda s: self.velocity(s) - (speed + a * (s - start)), now, t, step)
+            h = stop - now
+            x, v, now = x + h * (v + 0.5 * a * h), v + a * h, stop
+            sticks = stop < t and abs(self.acceleration(stop)) <= most
+            sign = -sign
+        return x, v
+
+    def _way(self, start: float, stop: float) -> float:
+        """Way of the support between two times, by Gauss's rule on short intervals."""
+        nodes, weights = np.polynomial.legendre.leggauss(8)
+        edges = np.linspace(start, stop, 1 + math.ceil((stop - start) / (20.0 * SCAN_SHARE * self.scale)))
+        total = 0.0
+        for a, b in zip(edges, edges[1:]):
+            total += 0.5 * (b - a) * sum(w * self.velocity(0.5 * (a + b) + 0.5 * (b - a) * s) for s, w in zip(nodes, weights))
+        return float(total)
+
+
+def on_turntable(place, velocity, spin: float, friction: float, t: float) -> np.ndarray:
+    """Place (x, z) at time t of a point that slides on a table of the given spin about y, by DOP853.
+
+    A point that moves with the table first, where friction cannot hold it, begins to slip outwards.
+    """
+
+    def rate(_, y):
+        x, v = y[:2], y[2:]
+        u = v - spin * np.array([x[1], -x[0]])  # the table's velocity is (0, spin, 0) x (x, 0, z)
+        return np.concatenate([v, -friction * GRAVITY * u / np.linalg.norm(u)])
+
+    x, v = np.array(place, dtype=float), np.array(velocity, dtype=float)
+    if not np.linalg.norm(v - spin * np.array([x[1], -x[0]])) > 0.0:
+        v = v + 1e-12 * x / np.linalg.norm(x)
+    return solve_ivp(rate, (0.0, t), [*x, *v], "DOP853", rtol=1e-12, atol=1e-14).y[:2, -1]
