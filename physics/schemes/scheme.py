@@ -115,8 +115,7 @@ class Switches:
 
     @property
     def columns(self) -> int:
-        """Number of columns of the parameter table behind those of all bodies: fields, coefficients at walls, laws,
-        motions."""
+        """Number of columns of the parameter table for fields, coefficients at walls, laws and motions."""
         return self.field_columns + self.material_columns + len(self.laws) + self.motion_columns
 
     @property

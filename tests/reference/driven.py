@@ -36,14 +36,15 @@ class BlockOnBelt:
 
     Attributes
     ----------
-    velocity, acceleration : callable
-        Of the support at a time [m/s, m/s²].
+    place, velocity, acceleration : callable
+        Of the support at a time [m, m/s, m/s²].
     friction : float
         Coefficient μ.
     scale : float
         Time over which the motion of the support changes [s].
     """
 
+    place: Callable[[float], float]
     velocity: Callable[[float], float]
     acceleration: Callable[[float], float]
     friction: float
@@ -59,7 +60,7 @@ class BlockOnBelt:
                 stop = now
                 if abs(self.acceleration(now + 1e-9 * step)) <= most:
                     stop = first_zero(lambda s: abs(self.acceleration(s)) - most, now, t, step)
-                x += self._way(now, stop)
+                x += self.place(stop) - self.place(now)
                 now, v = stop, self.velocity(stop)
                 sign, sticks = math.copysign(1.0, self.acceleration(min(stop + 1e-3 * step, t))), False
                 continue
@@ -70,15 +71,6 @@ class BlockOnBelt:
             sticks = stop < t and abs(self.acceleration(stop)) <= most
             sign = -sign
         return x, v
-
-    def _way(self, start: float, stop: float) -> float:
-        """Way of the support between two times, by Gauss's rule on short intervals."""
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        edges = np.linspace(start, stop, 1 + math.ceil((stop - start) / (20.0 * SCAN_SHARE * self.scale)))
-        total = 0.0
-        for a, b in zip(edges, edges[1:]):
-            total += 0.5 * (b - a) * sum(w * self.velocity(0.5 * (a + b) + 0.5 * (b - a) * s) for s, w in zip(nodes, weights))
-        return float(total)
 
 
 def on_turntable(place, velocity, spin: float, friction: float, t: float) -> np.ndarray:

@@ -35,6 +35,7 @@ from physics.kernels.multibody.data.arrays import (
     NarrowPhase,
     Newton,
     PairMaterials,
+    StageStart,
     Sweeps,
     WorldSnapshots,
 )
@@ -290,6 +291,7 @@ def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | Non
         clock=np.zeros(2),
         velocity=np.zeros((contacts, 3)),
         target=np.zeros((contacts, 3)),
+        start=StageStart(np.zeros((bodies, STATE_SIZE)), np.zeros((contacts, 3)), np.zeros((contacts, 3))),
     )
 
 

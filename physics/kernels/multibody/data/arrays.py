@@ -217,6 +217,14 @@ class PairMaterials(NamedTuple):
     restitution: np.ndarray  # (m,) coefficients of restitution of these pairs
 
 
+class StageStart(NamedTuple):
+    """What `stepping.slip_end` saves at the start of a stage that may be made again."""
+
+    state: np.ndarray  # (bodies, STATE_SIZE) states of the bodies
+    target: np.ndarray  # (contacts, 3) targets of the contacts [m/s]
+    slip: np.ndarray  # (contacts, 3) slip of the first end on the second one, world frame [m/s]
+
+
 class DrivenBodies(NamedTuple):
     """Prescribed motions of fixed bodies, and their part in contacts; see `driven_bodies`."""
 
@@ -224,6 +232,7 @@ class DrivenBodies(NamedTuple):
     clock: np.ndarray  # (2,) time of the world at the start of the call, and now [s]
     velocity: np.ndarray  # (contacts, 3) velocity of the second end, world frame; 0 unless it is driven [m/s]
     target: np.ndarray  # (contacts, 3) during a solve: targets relative to the driven ends [m/s]
+    start: StageStart
 
 
 class BodiesWorkspace(NamedTuple):

@@ -235,6 +235,15 @@ def _join_points(k, a, b, owner, gap, n, many):
 
 
 @inlined
+def end_of_pair(k, n, many):
+    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        k += 1
+    return k
+
+
+@inlined
 def is_stopping(gap, speed, slop, h):
     """True if a contact would stop its bodies within h [s], because they would overlap at their present speed.
 

@@ -27,6 +27,7 @@ from physics.kernels.multibody.data.contact_set import (
     PARTED,
     add_contact,
     add_scaled,
+    end_of_pair,
     is_stopping,
     pair_slop,
     row_matrix,
@@ -222,15 +223,6 @@ def _gap_along(a, b, n, hulls, many):
 
 
 @inlined
-def _end_of_pair(k, n, many):
-    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
-        k += 1
-    return k
-
-
-@inlined
 def _fastest_stopping(first, last, h, many):
     """Fastest contact in [first, last), all of one pair, among those that would stop the pair within h [s]; -1: none.
 
@@ -275,7 +267,7 @@ def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
         many.contacts.target[k, 0] = 0.0
     k = 0
     while k < n:
-        last = _end_of_pair(k, n, many)
+        last = end_of_pair(k, n, many)
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             mark = _mark_of_pair(found, n, h, gyroscopic, offset_frame, hulls, many)
@@ -319,7 +311,7 @@ def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:
-        last, is_passing = _end_of_pair(k, n, many), False
+        last, is_passing = end_of_pair(k, n, many), False
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             is_passing, left = _redirect_pair(found, n, left, h, gyroscopic, offset_frame, hulls, many)

@@ -39,9 +39,10 @@ from physics.kernels.multibody.stepping.conservative_advancement import (
     write_spin_bounds,
 )
 from physics.kernels.multibody.stepping.impact import resolve_impacts
-from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads, midpoint_step
+from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads
 from physics.kernels.multibody.stepping.passing_pairs import redirect_passing_pairs
 from physics.kernels.multibody.stepping.position_correction import correct_positions
+from physics.kernels.multibody.stepping.slip_end import step_to_slip_end
 from physics.kernels.state import layout as at
 from physics.kernels.state.groups import flies_exactly
 
@@ -129,7 +130,7 @@ def substep_world(
             cuts += 1
         if t < left:
             records.report[world, at.SPLITS] += 1.0
-        midpoint_step(n, world, t, switches, sleep, records, many)
+        t = step_to_slip_end(n, world, start + (h - left), t, is_last, switches, sleep, records, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.body[b])
