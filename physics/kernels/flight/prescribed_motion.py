@@ -46,12 +46,23 @@ def _find_knot(m, b, t):
 
 
 @inlined
+def _end_of_table(m, b):
+    return m[b, MOTION_SIZE + KNOT_SIZE * (int(m[b, KNOTS]) - 1) + KNOT_TIME]
+
+
+@inlined
 def _table_time(m, b, t):
     """Time of the table of body b at the time t of the world [s]: at its ends it stands, or begins again."""
     s, period = t - m[b, START], m[b, PERIOD]
     if period > 0.0:
         return s - period * math.floor(s / period)
-    return min(max(s, 0.0), m[b, MOTION_SIZE + KNOT_SIZE * (int(m[b, KNOTS]) - 1) + KNOT_TIME])
+    return min(max(s, 0.0), _end_of_table(m, b))
+
+
+@inlined
+def _stands(m, b, t):
+    """True if the table of body b has not begun, or has ended, at the time t of the world [s]."""
+    return m[b, PERIOD] == 0.0 and not 0.0 < t - m[b, START] < _end_of_table(m, b)
 
 
 @inlined
@@ -93,6 +104,8 @@ def table_pose(m, b, t):
 @kernel
 def table_twist(m, b, t):
     """Velocity [m/s] and angular velocity [rad/s] of body b at the time t of the world [s], by its table."""
+    if _stands(m, b, t):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     knot, s, h = _share_of_interval(m, b, _table_time(m, b, t))
     v = (
         _interpolate(m, b, knot, 3, KNOT_PLACE, s, h)[1],
