@@ -164,7 +164,8 @@ class Motion:
     def _check_period(self) -> None:
         if self.pos is not None and np.abs(np.subtract(self.pos[-1], self.pos[0])).max() > SAME_POSE:
             raise ValueError(
-                f"Motion.pos ends at {self.pos[-1]} and begins at {self.pos[0]} with repeat=True; allowed are equal ones"
+                f"Motion.pos ends at {self.pos[-1]} and begins at {self.pos[0]} with repeat=True; allowed are equal "
+                "places"
             )
         if self.quat is not None:
             ends = np.array([self.quat[0], self.quat[-1]])

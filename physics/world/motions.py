@@ -71,9 +71,9 @@ def new_columns(motion: Motion, plan: Plan, rows: np.ndarray, time: float) -> np
 
 
 def changed_columns(old: np.ndarray, velocity, spin, surface_velocity) -> np.ndarray:
-    """Columns (k, motion_columns) of steady motions: those of `old` with new numbers (3,) or (k, 3), None: the old ones.
+    """Columns (k, motion_columns) of steady motions: those of `old` with new numbers (3,) or (k, 3).
 
-    A table in `old` ends, and its velocities count as 0.
+    None keeps the old numbers. A table in `old` ends, and its velocities count as 0.
     """
     new = np.zeros_like(old)
     new[:, KIND] = STEADY

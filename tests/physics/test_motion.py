@@ -205,7 +205,11 @@ def test_a_table_is_a_spline_of_places_and_of_attitudes(repeat):
     quat[1:] *= signs[:, None]
     t, end, delta = times, 0.6, 1e-5
     if repeat and quat[-1] @ quat[0] < 0.0:  # the components have twice the period
-        t, pos, quat = np.concatenate([t, 0.6 + t[1:]]), np.concatenate([pos, pos[1:]]), np.concatenate([quat, -quat[1:]])
+        t, pos, quat = (
+            np.concatenate([t, 0.6 + t[1:]]),
+            np.concatenate([pos, pos[1:]]),
+            np.concatenate([quat, -quat[1:]]),
+        )
         end = 1.2
     kind = "periodic" if repeat else "clamped"
     place, components = CubicSpline(t, pos, bc_type=kind), CubicSpline(t, quat, bc_type=kind)

@@ -66,7 +66,10 @@ BAD = [
     (lambda: physics.Motion(velocity=(1, 0, 0), times=TIMES, pos=PLACES), "Motion.velocity is .* with a table"),
     (lambda: physics.Motion(pos=PLACES), "Motion.pos is given without times"),
     (lambda: physics.Motion(repeat=True), "Motion.repeat is True without times"),
-    (lambda: physics.Motion.table((0,), [(0, 0, 0)]), r"Motion.times has the shape \(1,\); allowed are 2 to 1000 times"),
+    (
+        lambda: physics.Motion.table((0,), [(0, 0, 0)]),
+        r"Motion.times has the shape \(1,\); allowed are 2 to 1000 times",
+    ),
     (lambda: physics.Motion.table((0, 2, 1), PLACES), "Motion.times is .*; allowed are increasing times"),
     (lambda: physics.Motion.table((1, 2, 3), PLACES), "Motion.times is .*the first of them 0"),
     (lambda: physics.Motion.table((0, 1)), "Motion.times is given without poses"),
@@ -201,7 +204,7 @@ def test_set_state_keeps_a_motion():
 
 def test_a_table_begins_when_it_is_set_where_the_body_stands():
     """A table of attitudes alone leaves the body at its place, in each world."""
-    one = world(2, motion=physics.Motion.table((0, 0.1, 0.2), np.zeros((3, 3)) + (0, -0.5, 0)))
+    one = world(2, motion=physics.Motion.table((0, 0.1, 0.2), np.tile((0, -0.5, 0), (3, 1))))
     one.set_motion(1, velocity=[(1, 0, 0), (2, 0, 0)])
     one.step(steps=10)
     one.set_motion(1, physics.Motion.table((0, 0.1), quat=[(1, 0, 0, 0), (0.8, 0, 0.6, 0)]))

@@ -31,8 +31,8 @@ def first_zero(f: Callable[[float], float], start: float, stop: float, step: flo
 class BlockOnBelt:
     """A block on a support that moves along a line with a smooth velocity; friction carries it.
 
-    While it slips its acceleration is ±μ g. A slip ends where both velocities are equal. There it sticks if friction can
-    give the acceleration of the support, until it cannot any more; else it slips the other way.
+    While it slips its acceleration is ±μ g. A slip ends where both velocities are equal. There it sticks if friction
+    can give the acceleration of the support, until it cannot any more; else it slips the other way.
 
     Attributes
     ----------
@@ -52,25 +52,30 @@ class BlockOnBelt:
 
     def state(self, t: float) -> tuple[float, float]:
         """Way [m] and velocity [m/s] at time t of a block that starts at rest."""
-        most, step, now, x, v = self.friction * GRAVITY, self.scale * SCAN_SHARE, 0.0, 0.0, 0.0
-        sign = math.copysign(1.0, self.velocity(0.0))
-        sticks = self.velocity(0.0) == 0.0
+        now, x, v = 0.0, 0.0, 0.0
+        sign, sticks = math.copysign(1.0, self.velocity(0.0)), self.velocity(0.0) == 0.0
         while now < t:
             if sticks:
-                stop = now
-                if abs(self.acceleration(now + 1e-9 * step)) <= most:
-                    stop = first_zero(lambda s: abs(self.acceleration(s)) - most, now, t, step)
-                x += self.place(stop) - self.place(now)
-                now, v = stop, self.velocity(stop)
-                sign, sticks = math.copysign(1.0, self.acceleration(min(stop + 1e-3 * step, t))), False
+                stop = self._end_of_hold(now, t)
+                x, v, now = x + self.place(stop) - self.place(now), self.velocity(stop), stop
+                sign, sticks = math.copysign(1.0, self.acceleration(stop)), False
                 continue
-            start, speed, a = now, v, sign * most
-            stop = first_zero(lambda s: self.velocity(s) - (speed + a * (s - start)), now, t, step)
-            h = stop - now
-            x, v, now = x + h * (v + 0.5 * a * h), v + a * h, stop
-            sticks = stop < t and abs(self.acceleration(stop)) <= most
-            sign = -sign
+            a = sign * self.friction * GRAVITY
+            stop = self._end_of_slip(now, v, a, t)
+            x, v, now = x + (stop - now) * (v + 0.5 * a * (stop - now)), v + a * (stop - now), stop
+            sticks, sign = abs(self.acceleration(stop)) <= abs(a), -sign
         return x, v
+
+    def _end_of_hold(self, start: float, t: float) -> float:
+        """Time after `start`, at most t, from which friction cannot give the acceleration of the support."""
+        most, step = self.friction * GRAVITY, self.scale * SCAN_SHARE
+        if abs(self.acceleration(start + 1e-9 * step)) > most:
+            return start
+        return first_zero(lambda s: abs(self.acceleration(s)) - most, start, t, step)
+
+    def _end_of_slip(self, start: float, speed: float, a: float, t: float) -> float:
+        """Time after `start`, at most t, at which a block of velocity speed + a (t - start) has that of the support."""
+        return first_zero(lambda s: self.velocity(s) - (speed + a * (s - start)), start, t, self.scale * SCAN_SHARE)
 
 
 def on_turntable(place, velocity, spin: float, friction: float, t: float) -> np.ndarray:

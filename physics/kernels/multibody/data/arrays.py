@@ -218,7 +218,7 @@ class PairMaterials(NamedTuple):
 
 
 class StageStart(NamedTuple):
-    """What `stepping.slip_end` saves at the start of a stage that may be made again."""
+    """Copies of a stage's start, from which `stepping.slip_end` makes it again."""
 
     state: np.ndarray  # (bodies, STATE_SIZE) states of the bodies
     target: np.ndarray  # (contacts, 3) targets of the contacts [m/s]

@@ -120,7 +120,7 @@ def drift_driven_bodies(h, many):
 
 @if_given("many.driven")
 def write_driven_velocities(state, first, many):
-    """Write the angular velocities of the driven bodies into `state`, whose rows for this world begin at row `first`."""
+    """Write the spins of the driven bodies into `state`, whose rows for this world begin at row `first`."""
     for b in range(many.bodies.state.shape[0]):
         if is_driven(b, many):
             w = twist_at(many.driven.columns, b, many.driven.clock[NOW])[1]

@@ -25,8 +25,8 @@ from physics.kernels.multibody.data.contact_set import (
     parted_slack,
     put_vector,
     relative_acceleration_bound,
-    slip_velocity,
     row_matrix,
+    slip_velocity,
     subtract,
     update_contacts,
 )

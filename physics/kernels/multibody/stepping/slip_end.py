@@ -5,9 +5,9 @@ first order in the velocity. On a body that stands it happens once, and the bloc
 in every period of the motion, and the errors add up. So the stage is then made again, up to the end of the slip.
 
 Let s₀ > 0 be the slip of a pair before the stage of length h, along its own direction e, and s₁ that after it. Without
-impulses it would be s. All contacts of the pair together have the share r = Σ p_t·e / Σ μ p_n of their friction, so that
-full friction against the slip would change it by F = (s₁ - s)/r. While it slips, the rate of the slip is nearly
-constant. So the slip ends at the time
+impulses it would be s. All contacts of the pair together use the share r = Σ p_t·e / Σ μ p_n of their friction. So
+full friction against the slip would change it by -F, with F = (s₁ - s)/r. While it slips, the rate of the slip is
+nearly constant. So the slip ends at the time
 
     h s₀ / (s₀ - s + F).
 
@@ -36,8 +36,8 @@ _FULL_SHARE = 1.0 - 1.0e-6
 _LEAST_SHARE = 0.05
 _SLIPPING_SHARE = 0.9
 
-# The end of a slip needs no cut within this share of a stage from its end, nor within so many tolerances from its start:
-# residuals leave slips of that size.
+# The end of a slip needs no cut within this share of a stage from its end, nor within so many tolerances from its
+# start: residuals leave slips of that size.
 _LAST_SHARE = 1.0 - 1.0e-6
 _FIRST_TOLERANCES = 100.0
 
