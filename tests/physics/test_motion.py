@@ -175,7 +175,7 @@ def test_a_press_that_closes_too_far_is_reported():
     The plates keep their motion.
     """
     plate = physics.Block((1, 1, 1), fixed=True, pos=(0, 1.02, 0), motion=physics.Motion(velocity=(0, -0.1, 0)))
-    block = physics.Block((0.5, 0.5, 0.5), 1.0, pos=(0, 0.25, 0))
+    block = physics.Block((0.5, 0.5, 0.4), 1.0, pos=(0, 0.25, 0))
     press = physics.World(physics.Scene([plate, support(physics.Motion()), block], effects=LAWS), dt=0.005)
     press.step(steps=30)
     assert press.report.ok
