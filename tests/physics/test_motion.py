@@ -228,3 +228,26 @@ def test_a_table_is_a_spline_of_places_and_of_attitudes(repeat):
     if not repeat:
         assert not moving.linvel[0, 0].any()
         assert not moving.angvel[0, 0].any()
+
+
+# --- with force fields ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.exhaustive
+def test_the_energy_budget_of_a_stiff_field_allows_for_the_work_of_a_belt():
+    """In syrup of c/m = 500/s a belt drags a block along with μ m g/c, as fast as its friction is strong.
+
+    A step of 5 ms is stiff. Its friction still moves the block, by μ g h, as that of a heavy moving slab would.
+    """
+    syrup = physics.Drag(coefficient=0.0, linear=1000.0)
+    motion, spline = shaker()
+    scene = physics.Scene([support(physics.Motion(surface_velocity=(2, 0, 0))), BOX], effects=[*LAWS, syrup])
+    for dt, speed in ((0.0005, MU * BOX.mass * GRAVITY / 1000.0), (0.005, MU * GRAVITY * 0.005)):
+        in_syrup = physics.World(scene, dt=dt)
+        in_syrup.step(steps=40)
+        assert in_syrup.linvel[0, 1, 0] == pytest.approx(speed, abs=1e-6)
+        assert in_syrup.report.ok
+    shaken = physics.World(physics.Scene([support(motion), BOX], effects=[*LAWS, syrup]), dt=0.005)
+    shaken.step(steps=30)
+    shaken.step(steps=30)
+    assert shaken.pos[0, 0, 0] == pytest.approx(float(spline(0.3)), abs=1e-14)  # fields keep the same time
