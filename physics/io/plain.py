@@ -17,6 +17,7 @@ from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
+from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene
 from physics.summary import shown
 
@@ -33,8 +34,8 @@ def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
 
 
 def plain_table(item) -> dict[str, Any]:
-    """Table of a body, wall or effect; parameters at their defaults are left out."""
-    found = {} if isinstance(item, HalfSpace) else {"kind": type(item).__name__}
+    """Table of a body, wall, effect or motion; parameters at their defaults are left out."""
+    found = {} if isinstance(item, (HalfSpace, Motion)) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
         if field.name == "mass" and isinstance(item, Body) and item.fixed:
@@ -45,6 +46,8 @@ def plain_table(item) -> dict[str, Any]:
 
 
 def _plain(value):
+    if isinstance(value, Motion):
+        return plain_table(value)
     return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
 

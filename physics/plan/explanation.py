@@ -81,6 +81,15 @@ def _group_rows(scene, grouped) -> tuple[Row, ...]:
     return (Row("collision groups", bool(grouped), reason, "a test of bits for each pair" if grouped else ""),)
 
 
+def _motion_rows(scene, columns) -> tuple[Row, ...]:
+    """Row that names the bodies with a prescribed motion; none if no body has one. A motion has so many `columns`."""
+    driven = [b for b, body in enumerate(scene.bodies) if body.motion is not None]
+    if not driven:
+        return ()
+    reason = f"declared: {'body' if len(driven) == 1 else 'bodies'} {', '.join(map(str, driven))}"
+    return (Row("prescribed motion", True, reason, f"{columns} numbers per body, velocities at contacts"),)
+
+
 def _own_coefficients(scene, name, pairs, rule, usual) -> str:
     """Text about the coefficients called `name` that bodies, walls and pairs have of their own, and about their rule.
 
@@ -192,6 +201,8 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
         return Row("sleeping", True, f"declared: {effect!r}", f"{SLEEP_SIZE} numbers per body, a look at each")
     if not touching:
         return Row("sleeping", False, "declared, but nothing can touch", "")
+    if any(body.motion is not None for body in scene.bodies):
+        return Row("sleeping", False, "declared, but nothing sleeps where a body has a prescribed motion", "")
     restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
     names = ", ".join(field.label for field in restless)
     return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
@@ -206,6 +217,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
     return (
         _gravity_row(needs.gravity),
         *_fixed_rows(scene),
+        *_motion_rows(scene, needs.motion_columns),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
         _sleeping_row(scene, touching, needs.sleeping),

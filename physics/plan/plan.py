@@ -45,8 +45,7 @@ class Plan(Switches):
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
             self.hulls, self.capsules, self.sleeping, self.fixed, self.grouped, self.features,
-            self.material_columns > 0,
-            self.walls_differ, self.pair_materials, *self.laws,
+            self.material_columns > 0, self.walls_differ, self.pair_materials, self.motion_columns > 0, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
 
@@ -120,6 +119,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         material_columns=needs.material_columns,
         walls_differ=needs.walls_differ or None,
         pair_materials=needs.pair_materials or None,
+        motion_columns=needs.motion_columns,
         scheme=scheme,
         rows=make_rows(scene, accuracy, needs, scheme.is_error_controlled and needs.touching),
     )

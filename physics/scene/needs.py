@@ -54,6 +54,8 @@ class Needs:
         default rules (`physics.scene.materials`).
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
+    motion_columns : int
+        Numbers of a body for its prescribed motion; 0 if no body has one.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -86,6 +88,7 @@ class Needs:
     walls_differ: bool
     pair_materials: bool
     grouped: bool
+    motion_columns: int
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -131,6 +134,7 @@ def find_needs(scene: Scene) -> Needs:
     touching = at_walls or meeting
     axes = [principal_axes(body.inertia) for body in scene.bodies if not body.fixed]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
     return Needs(
@@ -141,13 +145,14 @@ def find_needs(scene: Scene) -> Needs:
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
         grouped=grouped,
+        motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,
         isotropic=isotropic,
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
         uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
-        sleeping=touching and steady and scene.effect(Sleeping) is not None,
+        sleeping=touching and steady and not motion_columns and scene.effect(Sleeping) is not None,
         fields=fields,
         laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip

@@ -72,7 +72,7 @@ class ManyBodies(Scheme):
             groups=group_table(scene) if switches.grouped else None,
             capsules=switches.capsules,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

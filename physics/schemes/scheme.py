@@ -85,6 +85,8 @@ class Switches:
         Columns of `params` for coefficients at walls; 0 if no wall has one of its own, and no exception names a wall.
     walls_differ : True or None
         Whether a body may have different coefficients at two walls.
+    motion_columns : int
+        Columns of `params` for prescribed motions; 0 if no body has one.
     pair_materials : True or None
         Whether two bodies in contact have other coefficients than those of the default rules.
     """
@@ -110,6 +112,7 @@ class Switches:
     material_columns: int
     walls_differ: bool | None
     pair_materials: bool | None
+    motion_columns: int
 
     @property
     def field_columns(self) -> int:
@@ -118,8 +121,8 @@ class Switches:
 
     @property
     def columns(self) -> int:
-        """Number of columns of the parameter table behind those of all bodies: fields, coefficients at walls, laws."""
-        return self.field_columns + self.material_columns + len(self.laws)
+        """Number of columns of the parameter table for fields, coefficients at walls, laws and motions."""
+        return self.field_columns + self.material_columns + len(self.laws) + self.motion_columns
 
     @property
     def terms(self) -> tuple[Term, ...]:

@@ -125,7 +125,7 @@ def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
     rebounds = contact and (contact.restitution or any(mu for _, _, mu in contact.restitution_pairs))
     lost: list[Any] = [contact] if contact and (rebounds or contact.tangential or contact.stiffness) else []
-    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution]
+    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution or getattr(item, "motion", None)]
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]

@@ -12,6 +12,7 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
+from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
@@ -97,7 +98,7 @@ def write_contact_frame(k, n, many):
 def relative_velocity(k, t, many):
     """Velocity of contact k's point on the first body relative to that on the second, world frame [m/s].
 
-    t (bodies, 6) holds the twists of all bodies.
+    t (bodies, 6) holds the twists of all bodies. A second body that is fixed counts as still even if it is driven.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.contacts.arm, k, 0)))
@@ -106,6 +107,12 @@ def relative_velocity(k, t, many):
             u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(row_vector(t, b, 3), row_vector(many.contacts.arm, k, 3)))
         )
     return u
+
+
+@inlined
+def slip_velocity(k, many):
+    """Velocity of contact k's point on the first body relative to that on the second, which may be driven [m/s]."""
+    return relative_to_driven(k, relative_velocity(k, many.bodies.twist, many), many)
 
 
 @inlined
@@ -164,7 +171,7 @@ def _may_turn_far(a, b, many):
 @inlined
 def relative_acceleration_bound(k, many):
     """Bound of the acceleration of contact k's two points relative to each other, without contact impulses [m/s²]."""
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
     if b < 0:
         return many.bodies.body[a].acceleration
     return many.bodies.body[a].acceleration + many.bodies.body[b].acceleration
@@ -237,6 +244,15 @@ def _join_points(k, a, b, owner, gap, n, many):
 
 
 @inlined
+def end_of_pair(k, n, many):
+    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        k += 1
+    return k
+
+
+@inlined
 def is_stopping(gap, speed, slop, h):
     """True if a contact would stop its bodies within h [s], because they would overlap at their present speed.
 
@@ -289,7 +305,8 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
         acceleration += many.bodies.body[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
-    speed = qt.dot(normal, relative_velocity(k, many.bodies.twist, many))
+    take_driven_velocity(k, many)
+    speed = qt.dot(normal, slip_velocity(k, many))
     slop = pair_slop(a, b, many)
     is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop
     if is_out_of_reach and not (_may_turn_far(a, b, many) and gap <= arrival_gap(a, b, many)):

@@ -15,7 +15,6 @@ stands out by less is no obstacle.
 from __future__ import annotations
 
 from physics.compiler.decorators import inlined, kernel, shared_kernel
-from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
@@ -29,11 +28,13 @@ from physics.kernels.multibody.data.contact_set import (
     PARTED,
     add_contact,
     add_scaled,
+    end_of_pair,
     is_stopping,
     pair_slop,
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.driven_bodies import attitude_after
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
@@ -133,7 +134,7 @@ def _is_stopping(k, h, many):
 def _end_pose(b, h, gyroscopic, offset_frame, many):
     """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
     x, q, v, L = read_state(many.bodies.state, b)
-    R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
+    R = to_matrix(attitude_after(b, q, L, h, gyroscopic, offset_frame, many))
     x = add_scaled(x, h, v)
     if offset_frame is not None:
         x = add_scaled(x, 1.0, center_arm(R, many.bodies.body[b]))
@@ -240,15 +241,6 @@ def _gap_along(k, n, hulls, many):
 
 
 @inlined
-def _end_of_pair(k, n, many):
-    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
-        k += 1
-    return k
-
-
-@inlined
 def _fastest_stopping(first, last, h, many):
     """Fastest contact in [first, last), all of one pair, among those that would stop the pair within h [s]; -1: none.
 
@@ -293,7 +285,7 @@ def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
         many.contacts.target[k, 0] = 0.0
     k = 0
     while k < n:
-        last = _end_of_pair(k, n, many)
+        last = end_of_pair(k, n, many)
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             mark = _mark_of_pair(found, n, h, gyroscopic, offset_frame, hulls, many)
@@ -337,7 +329,7 @@ def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:
-        last, is_passing = _end_of_pair(k, n, many), False
+        last, is_passing = end_of_pair(k, n, many), False
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             is_passing, left = _redirect_pair(found, n, left, h, gyroscopic, offset_frame, hulls, many)
