@@ -24,9 +24,11 @@ from physics.keywords import no_attribute as _no_attribute
 from physics.plan.plan import make_plan
 from physics.scene import canonical_scenes as scenes
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.capsule import Capsule
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, field_function
 from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
+from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
 from physics.schemes.contacts import Contacts
 from physics.version import version as _version
@@ -53,6 +55,7 @@ __all__ = [
     "Block",
     "Body",
     "Buoyancy",
+    "Capsule",
     "Contact",
     "Contacts",
     "Diagnostics",
@@ -68,6 +71,7 @@ __all__ = [
     "Hull",
     "Impacts",
     "Magnus",
+    "Motion",
     "Nearest",
     "Push",
     "RayHits",

@@ -11,6 +11,7 @@ from physics.analysis.contact_samples import NAMES, ContactSamples
 from physics.analysis.events import Event
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.body_names import body_names
+from physics.scene.capsule import Capsule
 from physics.scene.effects import Contact
 from physics.scene.scene import HalfSpace, Scene
 
@@ -96,6 +97,9 @@ def _body(kind, mass, inertia, dimensions, center, corners, name) -> Body:
         return Sphere(dimensions[0], **given)
     if kind == "ellipsoid":
         return Ellipsoid(dimensions, **given)
+    if kind == "capsule":
+        radius, half = dimensions[:2]
+        return Capsule(radius, 2.0 * (half - radius), **given)
     if kind == "hull":
         return Hull(corners, **given)
     raise ValueError(f"its scene has a body of kind {kind!r}")

@@ -14,12 +14,14 @@ from typing import Any
 from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.capsule import Capsule
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
+from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene
 from physics.summary import shown
 
-BODIES = (Block, Sphere, Ellipsoid, Hull)
+BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
 """Classes that each list of a scene may hold."""
@@ -32,8 +34,8 @@ def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
 
 
 def plain_table(item) -> dict[str, Any]:
-    """Convert a body, wall or effect to a table; parameters at their defaults are left out."""
-    found = {} if isinstance(item, HalfSpace) else {"kind": type(item).__name__}
+    """Convert a body, wall, effect or motion to a table; parameters at their defaults are left out."""
+    found = {} if isinstance(item, (HalfSpace, Motion)) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
         if field.name == "mass" and isinstance(item, Body) and item.fixed:
@@ -44,6 +46,8 @@ def plain_table(item) -> dict[str, Any]:
 
 
 def _plain(value):
+    if isinstance(value, Motion):
+        return plain_table(value)
     return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
 

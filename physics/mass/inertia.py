@@ -78,6 +78,22 @@ def ellipsoid_moments(semi_axes: np.ndarray, mass: float | np.ndarray) -> np.nda
     return _plane_symmetric(semi_axes, mass) / 5
 
 
+def capsule_moments(dimensions: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
+    """Principal moments (..., 3) [kg m²] of solid capsules along body y, of `mass` (...) [kg].
+
+    `dimensions` (..., 3) are half extents (r, l + r, r) [m]. The cylinder, of length 2 l, has the mass m, and both
+    hemispheres together have M. The centre of a hemisphere is 3 r/8 from its plane, so that across the axis they have
+    M (2 r²/5 + l² + 3 l r/4), by the parallel-axis theorem twice.
+    """
+    r, square = dimensions[..., 0], dimensions[..., 0] * dimensions[..., 0]
+    half = dimensions[..., 1] - r
+    cylinder = mass * (half / (half + 2 / 3 * r))
+    ball = mass - cylinder
+    across = cylinder * (square / 4 + half * half / 3) + ball * (2 / 5 * square + half * (half + 3 / 4 * r))
+    along = cylinder * (square / 2) + ball * (2 / 5 * square)
+    return np.stack([across, along, across], axis=-1)
+
+
 def _plane_symmetric(axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
     """Products (b² + c², a² + c², a² + b²) mass (..., 3), where `axes` (..., 3) are (a, b, c).
 
@@ -139,6 +155,12 @@ def disk(radius: float, mass: float) -> np.ndarray:
     square = float(_positive(radius, (), "radius")) ** 2
     mass = float(_positive(mass, (), "mass"))
     return _of_revolution(across=mass * square / 4, along=mass * square / 2)
+
+
+def solid_capsule(radius: float, length: float, mass: float) -> np.ndarray:
+    """Inertia tensor (3, 3) of a solid capsule along body y; `length` [m] is that of its cylinder alone."""
+    radius, half = float(_positive(radius, (), "radius")), 0.5 * float(_positive(length, (), "length"))
+    return np.diag(capsule_moments(np.array([radius, half + radius, radius]), float(_positive(mass, (), "mass"))))
 
 
 def rod(length: float, mass: float) -> np.ndarray:

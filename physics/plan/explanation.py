@@ -37,8 +37,9 @@ def _contact_row(scene, contact) -> Row:
     if contact is not None and touching is not None and scene.walls and not touching[:, len(scene.bodies) :].any():
         return Row("wall contact", False, "groups keep all bodies from all walls", "")
     if contact is not None and scene.walls:
-        hulls = ", corners of hulls" if any(body.kind == "hull" for body in scene.bodies) else ""
-        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{hulls}, impacts, solver")
+        kinds = {body.kind for body in scene.bodies}
+        also = ", corners of hulls" * ("hull" in kinds) + ", ends of capsules" * ("capsule" in kinds)
+        return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{also}, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
     reason = "not declared: the walls do not act" if scene.walls else "not declared"
@@ -48,7 +49,7 @@ def _contact_row(scene, contact) -> Row:
 def _between_row(scene, contact, many) -> Row:
     if many:
         kinds = {body.kind for body in scene.bodies}
-        also = "".join(f", {kind}s" for kind in ("ellipsoid", "hull") if kind in kinds)
+        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "hull") if kind in kinds)
         return Row(
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )
@@ -78,6 +79,15 @@ def _group_rows(scene, grouped) -> tuple[Row, ...]:
     of_bodies, of_walls = int(np.triu(apart[:, :count]).sum()), int(apart[:, count:].sum())
     reason = f"declared: bits keep apart {of_bodies} pair(s) of bodies and {of_walls} of a body and a wall"
     return (Row("collision groups", bool(grouped), reason, "a test of bits for each pair" if grouped else ""),)
+
+
+def _motion_rows(scene, columns) -> tuple[Row, ...]:
+    """Row that names the bodies with a prescribed motion; none if no body has one. A motion has so many `columns`."""
+    driven = [b for b, body in enumerate(scene.bodies) if body.motion is not None]
+    if not driven:
+        return ()
+    reason = f"declared: {'body' if len(driven) == 1 else 'bodies'} {', '.join(map(str, driven))}"
+    return (Row("prescribed motion", True, reason, f"{columns} numbers per body, velocities at contacts"),)
 
 
 def _own_coefficients(scene, name, pairs, rule, usual) -> str:
@@ -191,6 +201,8 @@ def _sleeping_row(scene, touching, sleeping) -> Row:
         return Row("sleeping", True, f"declared: {effect!r}", f"{SLEEP_SIZE} numbers per body, a look at each")
     if not touching:
         return Row("sleeping", False, "declared, but nothing can touch", "")
+    if any(body.motion is not None for body in scene.bodies):
+        return Row("sleeping", False, "declared, but nothing sleeps where a body has a prescribed motion", "")
     restless = [field for field in scene.effects if isinstance(field, Field) and not field.is_steady]
     names = ", ".join(field.label for field in restless)
     return Row("sleeping", False, f"declared, but nothing rests under what may change on its own: {names}", "")
@@ -205,6 +217,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
     return (
         _gravity_row(needs.gravity),
         *_fixed_rows(scene),
+        *_motion_rows(scene, needs.motion_columns),
         Row("applied wrench", True, "given to step(wrench)", "six numbers per body, zero without one"),
         _actuator_row(scene),
         _sleeping_row(scene, touching, needs.sleeping),

@@ -16,6 +16,7 @@ from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.mass.polyhedron import Polyhedron, convex_hull
 from physics.scene.groups import GROUP, MASK, check_groups
+from physics.scene.motion import Motion, motion_of
 from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
 
 FROM_DENSITY: Any = None  # default of `mass`, replaced by density times volume when the body is made
@@ -66,14 +67,14 @@ else:
     _Shape = object
 
 
-def _body_repr(body: Body) -> str:
+def body_repr(body: Body) -> str:
     """`repr` of a body, an expression that makes it again: the infinite mass of a fixed one is left out."""
     return fields_repr(body, omitted=("mass",) if body.fixed else ())
 
 
 @dataclass(frozen=True, kw_only=True)
 class Body(_Shape):
-    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid` or `Hull`.
+    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid`, `Capsule` or `Hull`.
 
     Parameters
     ----------
@@ -97,12 +98,15 @@ class Body(_Shape):
     group, mask : int
         Bits of the collision groups that the body belongs to, and of those that it touches. Two bodies, or a body and a
         wall, touch only if the group of each has a bit of the other's mask. By default all touch.
+    motion : Motion, optional
+        Prescribed motion of a fixed body, such as ``Motion(spin=(0, 1, 0))``. With a table `pos` and `quat` become
+        those of its start.
 
     Raises
     ------
     ValueError
         A parameter out of range, not exactly one of mass and density, or a name without printable characters. A fixed
-        body with a mass, a density, an inertia, a velocity, or a `center` other than 0.
+        body with a mass, a density, an inertia, a velocity, or a `center` other than 0. A motion without `fixed`.
     """
 
     pos: Vector = (0.0, 0.0, 0.0)
@@ -117,6 +121,7 @@ class Body(_Shape):
     fixed: bool = field(default=False, metadata=SHOWN_IF_GIVEN)
     group: int = field(default=GROUP, metadata=SHOWN_IF_GIVEN)
     mask: int = field(default=MASK, metadata=SHOWN_IF_GIVEN)
+    motion: Motion | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
 
     def _repr_html_(self) -> str:
@@ -124,10 +129,13 @@ class Body(_Shape):
 
     def __post_init__(self) -> None:
         if type(self) is Body:
-            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid and Hull")
+            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid, Capsule and Hull")
         if not isinstance(self.fixed, (bool, np.bool_)):
             raise ValueError(f"fixed is {shown(self.fixed)}; allowed are True and False")
         self._set("fixed", bool(self.fixed))
+        self._set("motion", motion_of(self.motion))
+        if self.motion is not None:
+            self._check_motion(self.motion)
         if self.fixed:
             self._check_fixed()
         else:
@@ -144,6 +152,13 @@ class Body(_Shape):
         check_groups(self)
         if not self.fixed:
             self._check_range()
+
+    def _check_motion(self, motion: Motion) -> None:
+        """Raise a ValueError for a motion of a body that is not fixed; take the pose at the start of a table."""
+        if not self.fixed:
+            raise ValueError(f"motion is {shown(motion)} of a body that is not fixed; allowed is None, or fixed=True")
+        for name, value in motion.start_pose().items():
+            self._set(name, value)
 
     def _check_fixed(self) -> None:
         """Raise a ValueError for parameters that a fixed body must not have; set `mass` to infinity."""
@@ -213,7 +228,7 @@ class Block(Body):
     mass: float = FROM_DENSITY
     center: Vector = field(default=(0.0, 0.0, 0.0), kw_only=True)
     kind = "block"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -232,6 +247,7 @@ class Block(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
             center: ArrayLike = ...,
         ) -> None: ...
 
@@ -285,7 +301,7 @@ class Sphere(Body):
     radius: float
     mass: float = FROM_DENSITY
     kind = "sphere"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -304,6 +320,7 @@ class Sphere(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -350,7 +367,7 @@ class Ellipsoid(Body):
     semi_axes: Vector
     mass: float = FROM_DENSITY
     kind = "ellipsoid"
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -369,6 +386,7 @@ class Ellipsoid(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -426,7 +444,7 @@ class Hull(Body):
     mass: float = FROM_DENSITY
     kind = "hull"
 
-    __repr__ = _body_repr
+    __repr__ = body_repr
 
     if TYPE_CHECKING:  # sequences and arrays are taken, tuples are kept
 
@@ -445,6 +463,7 @@ class Hull(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

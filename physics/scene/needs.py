@@ -54,6 +54,8 @@ class Needs:
         default rules (`physics.scene.materials`).
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
+    motion_columns : int
+        Numbers of a body for its prescribed motion; 0 if no body has one.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -86,6 +88,7 @@ class Needs:
     walls_differ: bool
     pair_materials: bool
     grouped: bool
+    motion_columns: int
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -105,6 +108,11 @@ class Needs:
     def hulls(self) -> bool:
         """True if hulls can touch walls or other bodies."""
         return self.touching and "hull" in self.kinds
+
+    @property
+    def capsules(self) -> bool:
+        """True if capsules can touch walls or other bodies."""
+        return self.touching and "capsule" in self.kinds
 
 
 def is_isotropic(moments: np.ndarray) -> Any:
@@ -126,6 +134,7 @@ def find_needs(scene: Scene) -> Needs:
     touching = at_walls or meeting
     axes = [principal_axes(body.inertia) for body in scene.bodies if not body.fixed]
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
+    motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
     return Needs(
@@ -136,13 +145,14 @@ def find_needs(scene: Scene) -> Needs:
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
         grouped=grouped,
+        motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,
         isotropic=isotropic,
         turned=not isotropic and any(is_tilted(R) for _, R in axes),
         uneven=[b for b, body in enumerate(scene.bodies) if any(body.center)],
-        sleeping=touching and steady and scene.effect(Sleeping) is not None,
+        sleeping=touching and steady and not motion_columns and scene.effect(Sleeping) is not None,
         fields=fields,
         laws=_laws(scene, contact, friction) if touching else (),
     )  # fmt: skip
@@ -165,7 +175,7 @@ def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool,
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
-    has_round = any(body.kind in ("sphere", "ellipsoid") for body in scene.bodies)
+    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in scene.bodies)
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,
         LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,

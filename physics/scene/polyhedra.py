@@ -7,11 +7,13 @@ from physics.scene.bodies import Body
 
 
 def polyhedra(bodies: tuple[Body, ...]) -> list:
-    """Polyhedron of each body for `hull_tables.make_hulls`; an empty list if no body is a hull.
+    """Polyhedron of each body for `hull_tables.make_hulls`; an empty list if no pair of bodies needs them.
 
-    A hull has its own polyhedron, a block the unit cube, and a round body None.
+    A hull has its own polyhedron, a block the unit cube, and a round body None. Hulls need them, and so do capsules
+    beside blocks.
     """
-    return every_polyhedron(bodies) if any(body.kind == "hull" for body in bodies) else []
+    kinds = {body.kind for body in bodies}
+    return every_polyhedron(bodies) if "hull" in kinds or {"capsule", "block"} <= kinds else []
 
 
 def every_polyhedron(bodies: tuple[Body, ...]) -> list:

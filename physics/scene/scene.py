@@ -16,6 +16,7 @@ from physics.annotations import Effect, Vector
 from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
+from physics.scene.capsule import Capsule
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups
@@ -241,12 +242,12 @@ class Scene:
             each.check(len(self.bodies))
             check_ends(each, self.bodies)
         for b, body in enumerate(self.bodies):
-            is_free_hull = body.kind == "hull" and not body.fixed
-            unknown = [type(each).__name__ for each in fields if each.needs_axes and is_free_hull]
+            is_without_axes = body.kind in ("hull", "capsule") and not body.fixed
+            unknown = [type(each).__name__ for each in fields if each.needs_axes and is_without_axes]
             if unknown:
                 raise ValueError(
-                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a hull; allowed with it are "
-                    "blocks, spheres and ellipsoids: it depends on what their surface is like"
+                    f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a {body.kind}; allowed with "
+                    "it are blocks, spheres and ellipsoids: it depends on what their surface is like"
                 )
         if fields and all(each.is_air for each in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
@@ -281,5 +282,7 @@ def _frames_of_package() -> int:
 
 
 def _names(allowed: Any) -> str:
-    kinds = {Body: (Block, Sphere, Ellipsoid, Hull)}.get(allowed, allowed if isinstance(allowed, tuple) else (allowed,))
+    kinds = allowed if isinstance(allowed, tuple) else (allowed,)
+    if allowed is Body:
+        kinds = (Block, Sphere, Ellipsoid, Capsule, Hull)
     return ", ".join(kind.__name__ for kind in kinds)

@@ -32,7 +32,9 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed bodies; at walls for hulls, spring-tied bodies and groups.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls and capsules at walls.
+
+    Bodies at walls that are tied by springs are stepped here, too.
 
     Parameters
     ----------
@@ -49,16 +51,16 @@ class ManyBodies(Scheme):
 
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
-        is_coupled = needs.touching and (needs.meeting or needs.linked or needs.hulls or needs.grouped)
-        return (is_coupled or needs.fixed) and is_precise == self.is_error_controlled
+        is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
+        return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, fixed bodies, groups that keep some bodies "
-                "from some walls, and Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, capsules, fixed bodies, groups that keep some "
+                "bodies from some walls, and Spring between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
@@ -68,8 +70,9 @@ class ManyBodies(Scheme):
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
             groups=group_table(scene) if switches.grouped else None,
+            capsules=switches.capsules,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip

@@ -71,6 +71,8 @@ class Switches:
         Whether ellipsoids are among bodies that can touch each other.
     hulls : True or None
         Whether hulls can touch walls or bodies.
+    capsules : True or None
+        Whether capsules can touch walls or bodies.
     sleeping : True or None
         Whether bodies may sleep.
     features : int
@@ -83,6 +85,8 @@ class Switches:
         Columns of `params` for coefficients at walls; 0 if no wall has one of its own, and no exception names a wall.
     walls_differ : True or None
         Whether a body may have different coefficients at two walls.
+    motion_columns : int
+        Columns of `params` for prescribed motions; 0 if no body has one.
     pair_materials : True or None
         Whether two bodies in contact have other coefficients than those of the default rules.
     """
@@ -100,6 +104,7 @@ class Switches:
     grouped: bool | None
     ellipsoids: bool | None
     hulls: bool | None
+    capsules: bool | None
     sleeping: bool | None
     features: int
     fields: tuple[FieldSlot, ...]
@@ -107,6 +112,7 @@ class Switches:
     material_columns: int
     walls_differ: bool | None
     pair_materials: bool | None
+    motion_columns: int
 
     @property
     def field_columns(self) -> int:
@@ -115,8 +121,8 @@ class Switches:
 
     @property
     def columns(self) -> int:
-        """Number of columns of the parameter table after a body's own: fields, wall coefficients and contact laws."""
-        return self.field_columns + self.material_columns + len(self.laws)
+        """Number of columns of the parameter table for fields, wall coefficients, contact laws and motions."""
+        return self.field_columns + self.material_columns + len(self.laws) + self.motion_columns
 
     @property
     def terms(self) -> tuple[Term, ...]:

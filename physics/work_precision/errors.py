@@ -122,6 +122,9 @@ def _support(body: Body, direction: np.ndarray) -> np.ndarray:
     """Support function (n,) [m] of a body about its geometric centre, for unit vectors (n, 3) in the body frame."""
     if body.kind == "hull":
         return (direction @ body.polyhedron.vertices.T).max(axis=-1)
+    if body.kind == "capsule":
+        radius, reach = body.dimensions[:2]
+        return (reach - radius) * np.abs(direction[..., 1]) + radius
     scaled = direction * body.dimensions
     if body.kind == "block":
         return np.abs(scaled).sum(axis=-1)

@@ -98,7 +98,7 @@ class Batch(Exclusive):
     impacts : KeptImpacts or None
         Impacts of the last step, if `World.keep_impacts` asks for them.
     is_plain : bool
-        Whether a step is the kernel call alone: no field needs the time, and no impacts are kept.
+        Whether a step is the kernel call alone: no field or motion needs the time, and no impacts are kept.
     is_bound : bool
         Whether a `Stepper` has bound the arrays, so that they must not be replaced.
     actuation : ActuatorState or None
@@ -169,9 +169,9 @@ class Batch(Exclusive):
         self.time += duration
 
     def _make_with_more(self, calls: list[BoundCall]) -> None:
-        """Make kernel calls; set the time of fields before them, and keep the impacts after them."""
-        if self.plan.fields:
-            self._make_with_fields(calls)
+        """Make kernel calls; set the time of fields and motions before them, and keep the impacts after them."""
+        if self.plan.fields or self.plan.motion_columns:
+            self._make_with_time(calls)
         else:
             self.team.run(calls)
         if self.impacts is not None:
@@ -187,14 +187,22 @@ class Batch(Exclusive):
         if self.impacts is not None:
             self.impacts.forget(self, chosen)
 
-    def _make_with_fields(self, calls: list[BoundCall]) -> None:
-        """Set the time of fields, and make kernel calls; an error in a user's field is reworded to name its class."""
-        for scratch in self.scratch:
-            body_records(scratch)["call_start"] = self.time
+    def _make_with_time(self, calls: list[BoundCall]) -> None:
+        """Set the time of the kernels, and make calls; an exception in a user's field is reworded to name its class."""
+        for k in range(len(self.scratch)):
+            self.clock_of(k)[:] = self.time
         try:
             self.team.run(calls)
         except Exception as error:
             raise raised(error, self.plan.fields)  # noqa: B904 (it has a cause already)
+
+    def clock_of(self, k: int) -> np.ndarray:
+        """View (n,) of the times at the start of a call [s] that fields and motions read in thread `k`; maybe empty."""
+        if self.plan.fields:
+            return np.atleast_1d(body_records(self.scratch[k])["call_start"])
+        if self.plan.motion_columns:
+            return self.scratch[k].driven.clock[:1]
+        return np.zeros(0)
 
     def no_wrench(self) -> NDArray[np.float64]:
         """Make an array of zero wrenches (worlds, bodies, 6) float64."""

@@ -11,7 +11,7 @@ from physics.kernels.state import layout as at
 from physics.plan.plan import Plan
 from physics.scene.effects import Gravity
 from physics.scene.force_field import write_columns
-from physics.world import materials, parameters
+from physics.world import materials, motions, parameters
 from physics.world.batch import Batch
 
 
@@ -50,4 +50,5 @@ def fill(world: Batch) -> None:
     parameters.write_laws(world.params, plan.laws, scene.effects)
     columns = world.params[:, at.PARAM_SIZE :]
     write_columns(plan.fields, columns, world.body_count, np.arange(world.worlds))
+    motions.write_scene_motions(scene, plan, world.state, world.params, 0.0)
     write_angular_momenta(np.arange(len(world.state)), world.state, world.params)

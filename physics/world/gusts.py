@@ -11,16 +11,19 @@ from physics.kernels.state import layout as at
 from physics.plan.plan import Plan
 from physics.scene.force_fields import Wind
 from physics.world.batch import Batch
+from physics.world.motions import has_tables
 
 PHASES = 3 * WIND_WAVES
 """Number of phases that decide the gusts of one `Wind`: one for each of its waves and components."""
 
 
 def reads_time(plan: Plan, params: np.ndarray) -> bool:
-    """True if a field of a plan may change with time: wind with gusts, or a user's field not declared steady.
+    """True if the time counts: for wind with gusts, a user's field not declared steady, or a motion by a table.
 
     `params` is the parameter table of a batch, which holds the strengths of the gusts.
     """
+    if has_tables(params, plan):
+        return True
     if any(slot.is_users and not all(effect.is_steady for effect in slot.effects) for slot in plan.fields):
         return True
     return any(params[:, first + WIND_GUST].any() for first in _winds(plan))

@@ -106,5 +106,5 @@ def _write_wall_column(params, shape, plan, which, field, value, check) -> None:
 
 
 def _first_column(params: np.ndarray, plan: Plan) -> int:
-    """First column of `params` for coefficients at walls; these columns are before those of the contact laws."""
-    return params.shape[1] - len(plan.laws) - plan.material_columns
+    """First column of `params` for coefficients at walls: before those of the contact laws and of motions."""
+    return params.shape[1] - plan.motion_columns - len(plan.laws) - plan.material_columns

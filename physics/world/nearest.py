@@ -16,9 +16,12 @@ from physics.plan.plan import SHAPE_CODES
 from physics.scene.bodies import Body
 from physics.summary import parts_repr, shown
 from physics.world.query_arguments import result
+from physics.world.query_calls import CAPSULE
 
 # A point: a sphere without radius, its bounding radius, its centre and its polyhedron.
 _POINT = (SPHERE, (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), None)
+
+SOLIDS = {"block": CUBE, "capsule": CAPSULE}
 
 
 class Nearest(NamedTuple):
@@ -102,11 +105,11 @@ def attitudes(value: ArrayLike, worlds: int) -> NDArray[np.float64]:
 
 
 def shape_numbers(shape: Body | None) -> tuple[int, Any, float, Any, Any]:
-    """Numbers of a shape for kernels: code, half edges or semi-axes, radius of a hull, centre, polyhedron or None."""
+    """Numbers of a shape for kernels: code, half extents, radius of a hull, centre, solid as of `QueryCalls.ask`."""
     if shape is None:
         return _POINT
     validation.instance(shape, Body, "shape", "a body such as physics.Sphere(...), or None for a point")
-    solid = shape.polyhedron if shape.kind == "hull" else CUBE if shape.kind == "block" else None  # type: ignore[attr-defined]
+    solid = shape.polyhedron if shape.kind == "hull" else SOLIDS.get(shape.kind)  # type: ignore[attr-defined]
     radius = float(solid.radius) if shape.kind == "hull" else 0.0
     dims, center = (tuple(map(float, part)) for part in (shape.dimensions, shape.center))
     return SHAPE_CODES[shape.kind], dims, radius, center, solid

@@ -136,7 +136,7 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
     mass : array_like or None
         Masses [kg], of `shape`; that of a fixed body must be infinite.
     size : array_like or None
-        Edges, or diameters, [m], of `shape` and three numbers.
+        Full extents along the body axes [m], of `shape` and three numbers: edges, or diameters.
     inertia_body : array_like or None
         Inertia tensors about the centre of mass, body frame [kg m²], of `shape` and 3 x 3 numbers; those of fixed
         bodies are not used.
@@ -156,6 +156,8 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
         rows = slice(b, None, len(bodies))
         if body.kind == "sphere":
             _check_spheres(halves[rows])
+        if body.kind == "capsule":
+            _check_capsules(halves[rows])
         if body.kind == "hull":
             _check_hull(b, body, halves[rows])
         if body.fixed:
@@ -210,6 +212,13 @@ def _check_spheres(halves) -> None:
     if len(bad):
         size = (2 * halves[bad[0]]).tolist()
         raise ValueError(f"size is {size} for a sphere; allowed are three equal diameters")
+
+
+def _check_capsules(halves) -> None:
+    bad = np.flatnonzero((halves[:, 0] != halves[:, 2]) | ~(halves[:, 1] > halves[:, 0]))
+    if len(bad):
+        size = (2 * halves[bad[0]]).tolist()
+        raise ValueError(f"size is {size} for a capsule; allowed are diameter, a larger length, the diameter again")
 
 
 def _check_hull(b, body, halves) -> None:

@@ -17,6 +17,9 @@ from physics.world.batch import Batch
 # Places of the arguments of a query kernel: queue, worlds, bodies, scratch, then the question and its answer.
 _QUEUE, _INDICES, _QUESTION = 0, 1, 4
 
+# Solid of a capsule, which has no polyhedron: its axis is a segment. It calls for kernels that know capsules.
+CAPSULE = "capsule"
+
 # Different polyhedra for which scratch and calls are kept; a further one clears all.
 MOST_SOLIDS = 16
 
@@ -36,6 +39,7 @@ class QueryCalls:
     def __init__(self, world: Batch):
         self._bodies = QueriedBodies(world.state, world.params, world.shapes)
         self._solids, self._walls = every_polyhedron(world.scene.bodies), world.walls
+        self._capsules = any(body.kind == "capsule" for body in world.scene.bodies) or None
         self._team, self._all = world.team, np.arange(world.worlds)
         self._scratch: dict[int, tuple[Any, list[QueryScratch]]] = {}
         self._calls: dict[tuple, list[BoundCall]] = {}
@@ -46,7 +50,7 @@ class QueryCalls:
 
         All worlds (None) are shared by the threads of the batch; the calling thread alone takes a choice of worlds. The
         types of the `question` must be the same in each call with the same kernel. `solid` is the polyhedron of a shape
-        in the question, None for a round shape.
+        in the question, `CAPSULE` for a capsule, None for another round shape.
         """
         is_all = indices is None
         if indices is None:
@@ -79,8 +83,11 @@ class QueryCalls:
             if len(self._scratch) == MOST_SOLIDS:
                 for kept in (self._scratch, self._calls, self._bound):
                     kept.clear()
-            bodies, solids = len(self._solids), [*self._solids, solid]
-            made = [make_query_scratch(bodies, self._walls, solids) for _ in range(self._team.size)]
+            capsules = True if solid is CAPSULE else self._capsules
+            solids = [*self._solids, None if solid is CAPSULE else solid]
+            made = [
+                make_query_scratch(len(self._solids), self._walls, solids, capsules) for _ in range(self._team.size)
+            ]
             self._scratch[id(solid)] = solid, made
         return self._scratch[id(solid)][1]
 

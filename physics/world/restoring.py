@@ -205,13 +205,13 @@ def _other_snapshot(snapshot: Snapshot, count: int) -> ValueError:
 
 
 def _check_clock(world: Batch, snapshot: Snapshot) -> None:
-    """Raise a ValueError if a field depends on time, as worlds of one batch cannot have different times.
+    """Raise a ValueError if a field or a motion depends on time, as worlds of one batch cannot have different times.
 
     It is called when only some worlds are restored, from a snapshot of another time.
     """
     if reads_time(world.plan, world.params) or reads_time(world.plan, snapshot.arrays[KEPT.index("params")]):
         raise ValueError(
             f"snapshot is of time {snapshot.time!r} s, and the batch of time {world.time!r} s, in a scene with a field "
-            "that may change with time; allowed is to restore all worlds, or a snapshot of the same time "
+            "or a motion that may change with time; allowed is to restore all worlds, or a snapshot of the same time "
             "(dataclasses.replace(snapshot, time=world.time), if the time does not matter)"
         )

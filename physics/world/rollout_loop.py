@@ -14,7 +14,6 @@ import numpy as np
 from physics.kernels.parallel import work_stealing
 from physics.kernels.parallel.work_stealing import RANGE_CHUNK, RANGE_END, TAKEN_CHUNK_END, begin_taking, take_chunk
 from physics.kernels.state.groups import WorkQueue
-from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.bound_call import BoundCall, bound_alike, loop_kernel, perform_all
 from physics.scene.field_errors import raised
 from physics.world.batch import Batch
@@ -130,7 +129,7 @@ class RolloutLoop:
         np.add.accumulate(times, out=times)  # as times add up step by step
         chains = [first.then(step).then(last) for first, step, last in zip(before, self._stepping, after, strict=True)]
         loops = [
-            _bound((outer, inner, BLOCK_STEPS, times[:-1], _clock(world, k), self.moments[k], *chains[k].handed))
+            _bound((outer, inner, BLOCK_STEPS, times[:-1], world.clock_of(k), self.moments[k], *chains[k].handed))
             for k, (outer, inner) in enumerate(zip(world.team.queues, self._inner, strict=True))
         ]
         try:
@@ -147,11 +146,6 @@ class RolloutLoop:
 
 def _raise_again(error: Exception, world: Batch) -> NoReturn:
     raise raised(error, world.plan.fields)
-
-
-def _clock(world: Batch, k: int) -> np.ndarray:
-    """View (records,) of the time [s] that the fields of thread `k` read; (0,) without fields."""
-    return np.atleast_1d(body_records(world.scratch[k])["call_start"]) if world.plan.fields else np.zeros(0)
 
 
 def _bound(arguments: tuple) -> BoundCall:

@@ -11,13 +11,13 @@ from physics import validation
 from physics.kernels.half_space.gap_queries import write_angular_momenta
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
-from physics.scene.body_names import body_label
+from physics.scene.body_names import body_index, body_label
 from physics.scene.effects import RESISTANCES, Contact, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.scene.groups import may_meet
 from physics.scene.springs import check_ends
 from physics.summary import shown
-from physics.world import choice, materials, parameters
+from physics.world import choice, materials, motions, parameters
 from physics.world.batch import Batch
 from physics.world.wall_distance import geometric_centres, wall_gaps
 
@@ -44,6 +44,7 @@ def set_state(world: Batch, pos, quat, linvel, angvel, worlds) -> None:
     chosen = _chosen(world, worlds)
     rows = _rows(world, chosen)
     state = _new_state(world, chosen, rows, pos, quat, linvel, angvel)
+    motions.check_tables_kept(world, chosen, world.state[rows], state, world.params[rows])
     _adopt(world, chosen, rows, state, world.params[rows], "set_state")
     if world.actuation is not None:
         world.actuation.forget(chosen)
@@ -60,6 +61,33 @@ def set_parameters(world: Batch, given: Mapping, worlds) -> None:
     _adopt(world, chosen, rows, world.state[rows], params, "set_parameters", keep_memory=given["size"] is None)
     if field is not None:
         world.gravity[chosen] = field
+
+
+def set_motion(world: Batch, body, motion, numbers: tuple, worlds) -> None:
+    """Give a fixed body of some worlds a motion; `World.set_motion` documents arguments and errors.
+
+    `numbers` are velocity, spin and surface velocity.
+    """
+    chosen, b = _chosen(world, worlds), body_index(body, "body", world.scene)
+    label = body_label(b, world.names)
+    if not world.scene.bodies[b].fixed:
+        raise ValueError(f"body is {label}, which is not fixed; allowed are bodies with fixed=True")
+    if not world.plan.motion_columns:
+        raise ValueError(
+            f"body is {label}, but no body of the scene has a motion, so its kernels leave motions out; give one of "
+            "them motion=physics.Motion()"
+        )
+    motions.check_one_way(motion, numbers)
+    rows = _rows(world, chosen)
+    state, params = world.state[rows], world.params[rows]
+    own, columns = state[b :: world.body_count], motions.motion_columns(params, world.plan)[b :: world.body_count]
+    if motion is None:
+        columns[:] = motions.changed_columns(columns, *numbers)
+    else:
+        columns[:] = motions.new_columns(motion, world.plan, own, world.time)
+    motions.write_motion_state(own, columns)
+    has_jumped = (own[:, : at.LINVEL] != world.state[rows][b :: world.body_count, : at.LINVEL]).any()
+    _adopt(world, chosen, rows, state, params, "set_motion", keep_memory=not has_jumped)
 
 
 def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str = "start") -> None:
@@ -89,6 +117,7 @@ def start_anew(world: Batch, worlds, state: Mapping, given: Mapping, what: str =
     if given:
         params = _new_parameters(world, chosen, rows, {**dict.fromkeys(PARAMETERS), **given})
     field = None if gravity is None else _new_gravity(world, chosen, gravity)
+    motions.write_scene_motions(world.scene, world.plan, new, params, world.time)
     _adopt(world, chosen, rows, new, params, what)
     if field is not None:
         world.gravity[chosen] = field
@@ -108,20 +137,25 @@ def _new_state(world: Batch, chosen, rows, pos, quat, linvel, angvel) -> np.ndar
         check = validation.unit_quaternion if name == "quat" else validation.finite
         value = check(validation.batch(value, shape, name), shape, name)
         if name in ("linvel", "angvel"):
-            _check_still(world, chosen, name, value)
+            value = _check_still(world, chosen, name, value)
         state[:, first : first + size] = value.reshape(-1, size)
     return state
 
 
-def _check_still(world: Batch, chosen, name: str, value: np.ndarray) -> None:
-    """Refuse velocities (k, bodies, 3) of the chosen worlds, called `name`, that are not 0 for a fixed body."""
-    bad = np.argwhere(value.any(axis=-1) & _fixed(world))
+def _check_still(world: Batch, chosen, name: str, value: np.ndarray) -> np.ndarray:
+    """Refuse velocities (k, bodies, 3) of the chosen worlds, called `name`, that are neither 0 nor a fixed body's own.
+
+    Returned are the velocities, with the fixed bodies' own ones.
+    """
+    own = getattr(world, name)[chosen]
+    bad = np.argwhere(value.any(axis=-1) & (value != own).any(axis=-1) & _fixed(world))
     if len(bad):
         k, b = bad[0].tolist()
         raise ValueError(
             f"{name} is {value[k, b].tolist()} for body {body_label(b, world.names)} in world {int(chosen[k])}, which "
-            "is fixed; allowed is (0, 0, 0)"
+            "is fixed; allowed is (0, 0, 0), or World.set_motion"
         )
+    return np.where(_fixed(world)[:, None], own, value)
 
 
 def _fixed(world: Batch) -> np.ndarray:

@@ -22,6 +22,18 @@ def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np
     return centres
 
 
+def lowest_reach(body: Any, quat: np.ndarray, dimensions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Lowest coordinate (k, walls) of a hull or capsule along each wall's normal, from its centre, in k poses [m].
+
+    `quat` (k, 4) are attitudes, `dimensions` (k, 3) half extents [m], and `normals` (walls, 3) unit vectors.
+    """
+    R = rotation_matrices(quat)
+    if body.kind == "hull":
+        return np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+    radius, half = dimensions[:, :1], dimensions[:, 1:2] - dimensions[:, :1]
+    return -half * np.abs(R[:, :, 1] @ normals.T) - radius
+
+
 def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Smallest gap of every body to any wall that it may touch.
 
@@ -40,11 +52,11 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
         Index of the wall with the smallest gap; -1 without walls.
     """
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-    touching = touching_pairs(world.scene, True)
+    touching, reached = touching_pairs(world.scene, True), ("hull", "capsule")
     if touching is None:
         deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
     for b, body in enumerate(world.scene.bodies):
-        if touching is None and body.kind != "hull":
+        if touching is None and body.kind not in reached:
             continue
         own = np.arange(b, len(state), world.body_count)
         walls = np.arange(len(world.walls)) if touching is None else np.flatnonzero(touching[b, world.body_count :])
@@ -52,15 +64,15 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
             found, index = np.empty(len(own)), np.empty(len(own), np.int64)
             deepest_gaps(own, state, params, world.shapes, world.walls[walls], found, index)
             gaps[own], which[own] = found, np.append(walls, -1)[index]
-        if body.kind == "hull" and len(walls):
-            each = _hull_gaps(body, state[own], world.walls[walls])
+        if body.kind in reached and len(walls):
+            each = _gaps(body, state[own], params[own], world.walls[walls])
             gaps[own], which[own] = each.min(axis=1), walls[each.argmin(axis=1)]
     return gaps, which
 
 
-def _hull_gaps(body: Any, state: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Gaps (k, walls) of a hull with the states (k, STATE_SIZE) to walls (walls, WALL_SIZE) [m]."""
+def _gaps(body: Any, state: np.ndarray, params: np.ndarray, walls: np.ndarray) -> np.ndarray:
+    """Gaps (k, walls) of a hull or capsule to walls (walls, WALL_SIZE), in k rows of `state` and `params` [m]."""
     normals, offsets = walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], walls[:, at.WALL_OFFSET]
-    R = rotation_matrices(state[:, at.QUAT : at.QUAT + 4])
-    reach = np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
+    sizes = params[:, at.DIMENSIONS : at.DIMENSIONS + 3]
+    reach = lowest_reach(body, state[:, at.QUAT : at.QUAT + 4], sizes, normals)
     return state[:, at.POS : at.POS + 3] @ normals.T - offsets + reach

@@ -23,6 +23,7 @@ from physics.plan.plan import SHAPE_CODES, make_plan
 from physics.scene.body_names import body_names
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
+from physics.scene.motion import Motion
 from physics.scene.scene import Scene
 from physics.summary import counted
 from physics.undo import undo_on_error
@@ -129,7 +130,8 @@ class World(Touching, Querying):
         self.team = Team(self.threads, self.worlds)
         register_terms(self.plan.terms)
         self._may_raise = self.plan.may_raise
-        self.is_plain, self.is_bound = not self.plan.fields and self.impacts is None, False
+        self.is_plain = not self.plan.fields and not self.plan.motion_columns and self.impacts is None
+        self.is_bound = False
         self.scratch = [
             self.plan.scheme.make_scratch(self.scene, self.plan, self.walls, self.accuracy)
             for _ in range(self.team.size)
@@ -342,6 +344,41 @@ class World(Touching, Querying):
         """
         numbers = (mass, size, inertia_body, friction, restitution, wall_friction, wall_restitution, effects)
         setters.set_parameters(self, {**dict(zip(setters.PARAMETERS, numbers)), "gravity": gravity}, worlds)
+
+    @known_keywords
+    @exclusive
+    def set_motion(
+        self,
+        body: int | str,
+        motion: Motion | None = None,
+        velocity: ArrayLike | None = None,
+        spin: ArrayLike | None = None,
+        surface_velocity: ArrayLike | None = None,
+        worlds: ArrayLike | None = None,
+    ) -> None:
+        """Give a fixed body a prescribed motion from now on, in all worlds or in some.
+
+        Parameters
+        ----------
+        body : int or str
+            Index or name of a body with ``fixed=True``.
+        motion : Motion, optional
+            Motion, the same in these worlds; ``Motion()`` stands still. The body jumps to the start of a table. A table
+            has at most as many times as the longest one of the scene.
+        velocity, spin, surface_velocity : (3,) or (k, 3) array_like, optional
+            Numbers of a steady motion instead of `motion`, as in `Motion`, for all k worlds alike or for each; None
+            keeps the old ones. A table ends.
+        worlds : (k,) int array_like, optional
+            Indices of the worlds to change, or a mask; None: all.
+
+        Raises
+        ------
+        ValueError
+            A body that is not fixed or not in the scene, a scene without a motion, both or neither of a motion and
+            numbers, a wrong shape, a number that is not finite, a table that is too long, or a world that does not
+            exist. Nothing has changed then.
+        """
+        setters.set_motion(self, body, motion, (velocity, spin, surface_velocity), worlds)
 
     # --- keeping and looking -----------------------------------------------------------------------------------
 

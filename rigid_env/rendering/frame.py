@@ -12,7 +12,7 @@ import numpy as np
 
 from rigid_env.rendering.geometry import rotation_matrices
 
-BODY_KINDS = ("block", "sphere", "ellipsoid", "hull")
+BODY_KINDS = ("block", "sphere", "ellipsoid", "hull", "capsule")
 
 FACE_COUNT = 6
 """Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
@@ -28,11 +28,11 @@ class BodyView:
 
     Parameters
     ----------
-    kind : {"block", "sphere", "ellipsoid", "hull"}
+    kind : {"block", "sphere", "ellipsoid", "hull", "capsule"}
         Kind of shape.
     dimensions : (3,) float
-        [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A hull: largest distances of its
-        corners from `pos`.
+        [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A capsule: half extents, its
+        axis along body y. A hull: largest distances of its corners from `pos`.
     pos : (3,) float
         Geometric centre of the shape; of a hull its centre of mass. World frame [m].
     quat : (4,) float
@@ -224,7 +224,7 @@ class Frame:
         rotation = rotation_matrices(np.array([body.quat for body in self.bodies]).reshape(count, 4))
         is_block = np.array([body.kind == "block" for body in self.bodies], dtype=bool)
         # half the diagonal of a block, the longest semi-axis of a round body, the corner of a box around a hull
-        is_round = np.array([body.kind in ("sphere", "ellipsoid") for body in self.bodies], dtype=bool)
+        is_round = np.array([body.kind in ("sphere", "ellipsoid", "capsule") for body in self.bodies], dtype=bool)
         radius = np.where(
             is_round, size.max(axis=1), np.where(is_block, 0.5, 1.0) * np.sqrt(np.sum(size * size, axis=1))
         )

@@ -1,4 +1,4 @@
-"""Convex meshes of bodies in the body frame: block, sphere, ellipsoid, hull."""
+"""Convex meshes of bodies in the body frame: block, sphere, ellipsoid, capsule, hull."""
 
 from __future__ import annotations
 
@@ -72,6 +72,8 @@ def body_mesh(body):
 
 @lru_cache(maxsize=64)
 def _body_mesh(kind, dimensions):
+    if kind == "capsule":
+        return capsule_mesh(dimensions)
     return block_mesh(dimensions) if kind == "block" else ellipsoid_mesh(dimensions)
 
 
@@ -118,6 +120,32 @@ def ellipsoid_mesh(semi_axes, subdivisions=SPHERE_SUBDIVISIONS):
     vertices, faces = _subdivided_octahedron(subdivisions, _triangles)
     vertices = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
     return _mesh(vertices * np.asarray(semi_axes, dtype=np.float64), faces, is_smooth=True)
+
+
+def capsule_mesh(dimensions, subdivisions=SPHERE_SUBDIVISIONS):
+    """Mesh of a capsule along body y with half extents `dimensions` (3,) [m]: `ellipsoid_mesh`, parted at y = 0.
+
+    The halves of the sphere move to the ends. Between them are rings of triangles from each end to the middle, so that
+    every triangle lies in one octant.
+    """
+    radius, half = dimensions[0], dimensions[1] - dimensions[0]
+    ball = ellipsoid_mesh((radius, radius, radius), subdivisions)
+    vertices, count = ball.vertices, len(ball.vertices)
+    lift, is_upper_face = np.array([0.0, half, 0.0]), ball.centres[:, 1] > 0.0
+    faces = np.where(is_upper_face[:, None], ball.faces, ball.faces + count)
+    middle, sides = 2 * count, []
+    for face in ball.faces[is_upper_face].tolist():
+        for a, b in zip(face, face[1:] + face[:1]):
+            if vertices[a, 1] == 0.0 == vertices[b, 1]:
+                for high, low in ((0, middle), (middle, count)):
+                    sides += [(b + high, a + high, a + low), (b + high, a + low, b + low)]
+    return _used(np.concatenate([vertices + lift, vertices - lift, vertices]), np.concatenate([faces, sides]))
+
+
+def _used(vertices, faces):
+    """Smooth mesh of these faces with those of the vertices that they have."""
+    used, faces = np.unique(faces, return_inverse=True)
+    return _mesh(vertices[used], faces.reshape(-1, 3), is_smooth=True)
 
 
 def patched_sphere(subdivisions):

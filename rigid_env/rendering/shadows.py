@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigid_env.rendering import palette
-from rigid_env.rendering.geometry import convex_hull, perpendiculars, plane_axes
+from rigid_env.rendering.geometry import convex_hull, perpendiculars, plane_axes, unit_vectors
 from rigid_env.rendering.meshes import body_mesh, unit_mesh
 
 SAMPLES = 16
@@ -17,6 +17,7 @@ SUN_RADIUS = 0.085
 """Tangent of half the sun's angular diameter; that of the real sun is 0.0047, but a softer shadow looks better."""
 
 OUTLINE_POINTS = 16
+LEAST_SHADOW = 1e-9  # sine of the angle between light and axis below which the shadow of a capsule is a circle
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 
 
@@ -51,11 +52,12 @@ def outlines(frame):
         Indices of n bodies, and points (n, SAMPLES or 1, k, 3) float64 [m], world frame: a closed loop of k points for
         each sample, or one loop for all samples.
     """
-    members = {"block": [], "round": [], "hull": []}
+    members = {"block": [], "round": [], "capsule": [], "hull": []}
     for index, body in enumerate(frame.bodies):
         members[body.kind if body.kind in members else "round"].append(index)
     found = []
-    for kind, outlined in (("block", _block_outlines), ("round", _round_outlines)):
+    closed_forms = ("block", _block_outlines), ("round", _round_outlines), ("capsule", _capsule_outlines)
+    for kind, outlined in closed_forms:
         if members[kind]:
             poses = frame.poses
             found.append(
@@ -80,6 +82,21 @@ def _round_outlines(pos, R, size):
     u, v = perpendiculars((palette.LIGHT @ R) / size)
     circles = _COSINES * u[:, None] + _SINES * v[:, None]
     return (pos[:, None] + (circles * size[:, None]) @ np.swapaxes(R, 1, 2))[:, None]
+
+
+def _capsule_outlines(pos, R, size):
+    """Outlines of capsules: half a circle about each end of the axis, one loop for all samples of the sun.
+
+    The circles are perpendicular to the light. They are parted across the shadow of the axis.
+    """
+    axis = R[:, :, 1]
+    across = axis - (axis @ palette.LIGHT)[:, None] * palette.LIGHT
+    is_upright = np.linalg.norm(across, axis=1) < LEAST_SHADOW
+    across[is_upright] = plane_axes(palette.LIGHT)[0]
+    u = unit_vectors(across)
+    circles = _COSINES * u[:, None] + _SINES * np.cross(palette.LIGHT, u)[:, None]
+    ends = np.sign(_COSINES) * ((size[:, 1] - size[:, 0])[:, None] * axis)[:, None]
+    return (pos[:, None] + size[:, :1, None] * circles + ends)[:, None]
 
 
 def _hull_outlines(body, R):

@@ -25,6 +25,9 @@ SUBDIVISIONS = (4, 6, 8, 10, 12)
 RIM_POINTS = 32
 """Number of points in the outline of a round body."""
 
+OWN_MESH = ("hull", "capsule")
+"""Kinds of bodies whose meshes have their size; all others share meshes of unit size."""
+
 _ANGLES = 2.0 * np.pi * np.arange(RIM_POINTS)[:, None] / RIM_POINTS
 _COSINES, _SINES = np.cos(_ANGLES), np.sin(_ANGLES)
 
@@ -93,14 +96,14 @@ def pose(canvas, frame, colours, rim_width, face_tint=None):
 
 
 def _meshes(canvas, bodies, depths):
-    """Yield the unit mesh of each body; a hull has a mesh of its own size."""
+    """Yield the unit mesh of each body; a hull or capsule has a mesh of its own size."""
     focal = canvas.camera.focal(canvas.size[1]) / canvas.scale
     count = sum(body.kind in ("sphere", "ellipsoid") for body in bodies)
     facet = FACET * max(1.0, count / FEW) ** 0.5
     for body, depth in zip(bodies, depths.tolist()):
         if body.kind == "block":
             yield unit_mesh("block")
-        elif body.kind == "hull":
+        elif body.kind in OWN_MESH:
             yield body_mesh(body)
         else:
             radius = focal * max(body.dimensions.tolist()) / max(depth, NEAR)
@@ -113,10 +116,10 @@ def _pose_alike(canvas, mesh, frame, members, colours, rim_width, face_tint):
     eye = np.array(canvas.camera.eye)
     pos, R, size = (array[members] for array in (frame.poses.pos, frame.poses.rotation, frame.poses.size))
     turned = np.swapaxes(R, 1, 2)
-    if frame.bodies[members[0]].kind == "hull":
+    rims, is_stretched = None, frame.bodies[members[0]].kind not in OWN_MESH
+    if not is_stretched:
         size = np.ones_like(size)
-    rims = None
-    if mesh.is_smooth:
+    elif mesh.is_smooth:
         rims = _rims(canvas, pos, R, size, eye, rim_width)
         # the mesh ends at the inner border of the line around it
         half = 0.5 * rim_width * canvas.unit / canvas.camera.focal(canvas.size[1])

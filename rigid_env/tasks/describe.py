@@ -270,6 +270,8 @@ def _merged(section: Section, part: Part) -> Section:
 
 
 def _mass(body: Body) -> str:
+    if body.motion is not None:
+        return ", which moves as prescribed"
     return ", fixed" if body.fixed else f" of {body.mass:g} kg"
 
 

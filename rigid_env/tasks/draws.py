@@ -294,7 +294,7 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
     """Check the draw `name`, a size or radius, against the shapes of the bodies that it means.
 
     A ValueError refuses a radius for a body that is no sphere, a radius beside a size for the same body, and a size
-    with three independent numbers for a sphere.
+    with three independent numbers for a sphere or a capsule.
     """
     kind = (parameter_of(name) or ("",))[0]
     bodies, place = world.scene.bodies, place_of(name, world.scene)
@@ -308,6 +308,11 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
         other = next((f"size{place}" for place in ("", f"[{index}]") if f"size{place}" in distributions), None)
         if kind == "radius" and other:
             raise ValueError(f"draws of {task} has {other!r} and {name!r} of body {index}; allowed is one of the two")
-        if kind == "size" and is_sphere and is_elementwise(distributions[name]):
-            told = f"draws {name} of {task} is {distributions[name]!r}, and body {index} is a Sphere, of one diameter"
-            raise ValueError(f"{told}; allowed is 'radius[{index}]' with a number, a pair or a distribution")
+        if kind != "size" or not is_elementwise(distributions[name]):
+            continue
+        told = f"draws {name} of {task} is {distributions[name]!r}, and body {index}"
+        if is_sphere:
+            allowed = f"'radius[{index}]' with a number, a pair or a distribution"
+            raise ValueError(f"{told} is a Sphere, of one diameter; allowed is {allowed}")
+        if bodies[index].kind == "capsule":
+            raise ValueError(f"{told} is a Capsule, of two equal diameters; allowed is Choice([...]) of whole sizes")

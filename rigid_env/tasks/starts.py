@@ -114,7 +114,8 @@ class Starts(Declaration):
     def _start(self, rows: np.ndarray, chosen: Mapping[str, np.ndarray]) -> None:
         shares = np.array([self.generators[world].random(self.episodes.uniforms) for world in rows])
         has_fields = bool(self.world.plan.fields)
-        if has_fields and len(rows) == self.worlds and reads_time(self.world.plan, self.world.params):
+        has_time = has_fields or self.world.plan.motion_columns
+        if has_time and len(rows) == self.worlds and reads_time(self.world.plan, self.world.params):
             self.world.time = 0.0  # so that the same seed leads to the same bits
         values = self.episodes.draw(rows, shares, chosen)
         self.move(rows, values, chosen)

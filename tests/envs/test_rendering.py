@@ -203,6 +203,7 @@ MESHES = {
     "block": block_mesh((5, 3, 2)),
     "sphere": body_mesh(BodyView("sphere", (1.5, 1.5, 1.5), (0, 0, 0))),
     "ellipsoid": ellipsoid_mesh((2.5, 1.5, 1.0), subdivisions=5),
+    "capsule": body_mesh(BodyView("capsule", (0.5, 1.75, 0.5), (0, 0, 0))),
 }
 WEDGE = physics.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], 1.0, pos=(0, 2, 0))
 
@@ -277,6 +278,19 @@ def test_ellipsoid_vertices_lie_on_the_ellipsoid():
     np.testing.assert_allclose(np.linalg.norm(scaled, axis=1), 1.0, rtol=ROUNDING)
 
 
+def off_axis(points, dimensions):
+    """Vectors (n, 3) from the axis of a capsule to points (n, 3), in its frame."""
+    half = dimensions[1] - dimensions[0]
+    return points - np.clip(points[:, 1:2], -half, half) * (0.0, 1.0, 0.0)
+
+
+def test_capsule_vertices_lie_on_the_capsule_and_no_triangle_crosses_an_octant():
+    mesh = MESHES["capsule"]
+    np.testing.assert_allclose(np.linalg.norm(off_axis(mesh.vertices, (0.5, 1.75)), axis=1), 0.5, rtol=ROUNDING)
+    corners = mesh.vertices[mesh.faces]
+    assert ((corners >= 0.0).all(axis=1) | (corners <= 0.0).all(axis=1)).all()
+
+
 @given(
     quat=arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: q @ q > 0.1),
     axes=st.tuples(*[st.floats(0.3, 3.0)] * 3),
@@ -313,6 +327,23 @@ def test_shadow_outline_of_an_ellipsoid_is_where_light_grazes():
     gradient = local / body.dimensions**2
     np.testing.assert_allclose(np.sum((local / body.dimensions) ** 2, axis=1), 1.0, rtol=ROUNDING)
     np.testing.assert_allclose(gradient @ rotation_matrix(TILTED).T @ palette.LIGHT, 0.0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("quat", [TILTED, (1.0, 0.0, 0.0, 0.0), None])
+def test_shadow_outline_of_a_capsule_is_where_light_grazes(quat):
+    """Also of one that points towards the light, whose shadow is a circle."""
+    quat = _towards(palette.LIGHT) if quat is None else quat
+    body = BodyView("capsule", (0.5, 2.0, 0.5), (1, 2, 3), quat)
+    ((_, points),) = outlines(Frame((body,)))
+    away = off_axis((points[0, 0] - body.pos) @ rotation_matrix(body.quat), body.dimensions)
+    np.testing.assert_allclose(np.linalg.norm(away, axis=1), 0.5, rtol=ROUNDING)
+    np.testing.assert_allclose(away @ rotation_matrix(body.quat).T @ palette.LIGHT, 0.0, atol=1e-12)
+
+
+def _towards(light):
+    """Quaternion that turns body y to the direction of the light."""
+    q = np.array([1.0 + light[1], light[2], 0.0, -light[0]])
+    return q / np.linalg.norm(q)
 
 
 @pytest.mark.parametrize("kind", ["block", "hull"])
@@ -361,7 +392,7 @@ HALF_TURN = (0.0, 0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("quat", [(1.0, 0.0, 0.0, 0.0), HALF_TURN], ids=["as it is", "half a turn"])
-@pytest.mark.parametrize("kind", ["block", "sphere", "ellipsoid"])
+@pytest.mark.parametrize("kind", ["block", "sphere", "ellipsoid", "capsule"])
 def test_middle_of_the_body_has_the_colour_of_the_lit_face_in_front(renderer, kind, quat):
     body = BodyView(kind, (4, 4, 4), (1, 5, 0), quat, colour=(200, 60, 40))
     frame = Frame((body,), THREE_WALLS)

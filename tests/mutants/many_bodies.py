@@ -39,6 +39,14 @@ BROADPHASE = [
 
 DATA = [
     _mutant(
+        "data-capsule",
+        "The contact point of a capsule is carried along by the body instead of staying below the axis.",
+        "data/contact_set.py",
+        "return add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm",
+        "return arm",
+        "physics/test_capsules.py::test_a_capsule_rolls_down_a_slope",
+    ),
+    _mutant(
         "data-arm",
         "The arm of a contact leads from its point to the centre of mass.",
         "data/contact_set.py",
@@ -96,6 +104,22 @@ NARROWPHASE = [
         "gap = d + qt.dot(n, r)",
         "gap = d - qt.dot(n, r)",
         "kernels/test_hulls.py::test_a_hull_touches_a_wall_with_the_corners_that_are_near",
+    ),
+    _mutant(
+        "narrowphase-capsule-edge",
+        "A capsule touches an edge only where the edge is nearer than any other point.",
+        "narrowphase/capsule_hull.py",
+        "if far > distance or",
+        "if far > 0.9 * distance or",
+        "kernels/test_capsules.py::test_a_capsule_over_an_edge_touches_it_whatever_rounding_does",
+    ),
+    _mutant(
+        "narrowphase-capsule-inside",
+        "The direction across an edge and the axis of a capsule counts beyond the normals of the edge's faces.",
+        "narrowphase/segment_polyhedron.py",
+        "if not qt.dot(left, u) * qt.dot(right, u) < 0.0:",
+        "if not qt.dot(left, u) * qt.dot(right, u) > 0.0:",
+        "kernels/test_capsules.py::test_the_least_gap_to_a_block_is_the_distance",
     ),
 ]
 
@@ -211,4 +235,49 @@ STEPPING = [
     ),
 ]
 
-MANY_BODIES = [*BROADPHASE, *DATA, *NARROWPHASE, *SOLVER, *STEPPING]
+_MOTION = "physics/test_motion.py::test_"
+
+DRIVEN = [
+    _mutant(
+        "driven-target",
+        "A solve does not know the velocity of a driven end.",
+        "data/driven_bodies.py",
+        "many.contacts.target[k, c] += qt.dot(row_vector(E, k, 3 * c), w)",
+        "many.contacts.target[k, c] += 0.0 * qt.dot(row_vector(E, k, 3 * c), w)",
+        _MOTION + "a_belt_carries_a_block_along",
+    ),
+    _mutant(
+        "driven-work",
+        "The work of driven bodies counts as energy that an impact creates.",
+        "data/driven_bodies.py",
+        "    return _work(n, many)",
+        "    return 0.0 * _work(n, many)",
+        _MOTION + "a_rising_plate_bats_a_block",
+    ),
+    _mutant(
+        "driven-arm",
+        "The spin of a driven body does not move its contact points.",
+        "data/driven_bodies.py",
+        "return plus(plus(v, qt.cross(w, arm)), s)",
+        "return plus(v, s)",
+        _MOTION + "a_block_stays_on_a_turntable",
+    ),
+    _mutant(
+        "driven-slip",
+        "A stage does not end where a slip on a driven body ends.",
+        "stepping/slip_end.py",
+        "if is_last or not t < h or trial == _MAX_TRIALS - 1:",
+        "if True:",
+        _MOTION + "a_block_drifts_on_a_shaker",
+    ),
+    _mutant(
+        "driven-surface",
+        "A moving surface pushes along the normal of a contact.",
+        "data/driven_bodies.py",
+        "s = minus(s, times(qt.dot(s, n), n))",
+        "s = minus(s, times(0.0 * qt.dot(s, n), n))",
+        _MOTION + "a_belt_up_a_slope_carries_a_block_without_slip",
+    ),
+]
+
+MANY_BODIES = [*BROADPHASE, *DATA, *NARROWPHASE, *SOLVER, *STEPPING, *DRIVEN]

@@ -36,6 +36,22 @@ WORLD = [
         "test_wrench.py::test_a_force_at_a_point_of_a_body_is_what_a_push_is",
     ),
     _mutant(
+        "world-table-spin",
+        "A body that follows a table of attitudes turns at half its angular velocity.",
+        "kernels/flight/prescribed_motion.py",
+        "scale = 2.0 / (w * w",
+        "scale = 1.0 / (w * w",
+        "test_motion.py::test_a_table_is_a_spline_of_places_and_of_attitudes",
+    ),
+    _mutant(
+        "world-table-slope",
+        "The spline through a table has no continuous acceleration.",
+        "scene/motion.py",
+        "2.0 * (w[:-1] + w[1:]), w[1:]",
+        "1.0 * (w[:-1] + w[1:]), w[1:]",
+        "test_motion.py::test_a_table_is_a_spline_of_places_and_of_attitudes",
+    ),
+    _mutant(
         "world-fault",
         "The status of a world with one fault does not tell it.",
         "world/report.py",

@@ -107,6 +107,11 @@ READ = {
     "align": of("", box('pos=".1 0 0" euler="0 0 30"')).replace("<freejoint/>", '<freejoint align="true"/>'),
     "turned geom": model(box('pos=".1 .2 .3" euler="10 20 30"'), after=f"<keyframe>{START}</keyframe>"),
     "turned ellipsoid": of('euler="20 30 40"', '<geom type="ellipsoid" size=".1 .2 .3" mass="1" zaxis="1 1 0"/>'),
+    "capsules": model(
+        '<geom type="capsule" size=".1 .2"/>',
+        '<geom type="capsule" size=".05" fromto="0 .1 0 .3 .2 .4" density="300"/>',
+        '<inertial pos="0 0 0" mass="3" fullinertia="1 1.1 1.2 .1 .05 .02"/><geom type="capsule" size=".1 .2"/>',
+    ),
     "off centre": model(
         '<inertial pos=".1 .2 .05" mass="3" fullinertia="1 1.1 1.2 .1 .05 .02"/>' + box('pos=".3 0 0"'),
         after=f"<keyframe>{START}</keyframe>",
@@ -157,12 +162,15 @@ READ = {
 HINGE = '<body><joint name="knee"/><geom size=".1" mass="1"/></body>'
 REFUSED = {
     "fixed rod": (
-        model(box(), world='<geom name="t" type="capsule" size="1 1"/>'),
-        "line 4: <geom 't'> is a fixed capsule",
+        model(box(), world='<geom name="t" type="cylinder" size="1 1"/>'),
+        "line 4: <geom 't'> is a fixed cylinder",
     ),
     "two geoms": (model(box() + box()), "line 5: <body> has 2 geoms that can touch others"),
     "no geom": (of("", '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'), "<body> has 0 geoms"),
-    "capsule": (model('<geom type="capsule" size=".1 .2"/>'), "<geom> of <body> is a capsule; allowed of a free body"),
+    "cylinder": (
+        model('<geom type="cylinder" size=".1 .2"/>'),
+        "<geom> of <body> is a cylinder; allowed of a free body",
+    ),
     "hinge": (model(box(), world=HINGE), "line 4: <joint 'knee'> is a hinge"),
     "leg": (model(box() + HINGE), "line 5: <joint 'knee'> is a hinge"),
     "tendon": (

@@ -71,6 +71,22 @@ def tube_cloud(inner: float, outer: float, height: float, mass: float) -> MassPr
     return point_cloud(points, mass * weights / weights.sum())
 
 
+def capsule_cloud(radius: float, length: float, mass: float) -> MassProperties:
+    """Particles with exactly the second moments of a capsule along y: a cylinder, and a ball with its halves moved."""
+    share = length / (length + 4 / 3 * radius)
+    (r, wr), (cos, wc) = radii(0.0, radius, 2), gauss(0, 1, 3)
+    phi = np.arange(4) * np.pi / 2
+    r, cos, phi = np.meshgrid(r, cos, phi, indexing="ij")
+    across = r * np.sqrt(1 - cos**2)
+    weights = np.tile((wr[:, None, None] * wc[None, :, None] * np.ones(4)).ravel(), 2)
+    halves = [
+        np.stack([across * np.cos(phi), side * (r * cos + length / 2), across * np.sin(phi)], axis=-1).reshape(-1, 3)
+        for side in (1, -1)
+    ]
+    ball = point_cloud(np.concatenate(halves), (1 - share) * mass * weights / weights.sum())
+    return compose([tube_cloud(0, radius, length, share * mass), ball])
+
+
 def same(a: np.ndarray, b: np.ndarray, tolerance: float = CLOUD) -> bool:
     """Equal up to `tolerance` of the largest entry."""
     return np.abs(a - b).max() <= tolerance * np.abs(b).max()
@@ -85,6 +101,7 @@ def same(a: np.ndarray, b: np.ndarray, tolerance: float = CLOUD) -> bool:
         (inertia.hollow_sphere(1.5, 4, 0.7), ball_cloud(0.7, 1.5, 4)),
         (inertia.solid_ellipsoid((1, 2, 3.5), 5), ball_cloud(0, 1, 5, (1, 2, 3.5))),
         (inertia.solid_cylinder(0.5, 3, 2), tube_cloud(0, 0.5, 3, 2)),
+        (inertia.solid_capsule(0.5, 3, 2), capsule_cloud(0.5, 3, 2)),
         (inertia.hollow_cylinder(0.5, 3, 2), tube_cloud(0.5, 0.5, 3, 2)),
         (inertia.hollow_cylinder(0.5, 3, 2, 0.2), tube_cloud(0.2, 0.5, 3, 2)),
         (inertia.disk(2, 3), tube_cloud(0, 2, 0, 3)),

@@ -85,7 +85,7 @@ def test_what_a_scene_cannot_hold_is_named_with_its_line(name):
 def test_the_rest_is_read_and_what_was_left_out_is_listed():
     text = model(
         box('name="a" friction=".5"'), box() + box(), box('name="c"'),
-        world='<geom name="t" type="capsule" size="1 1"/>' + floor('name="f" friction=".5"'),
+        world='<geom name="t" type="cylinder" size="1 1"/>' + floor('name="f" friction=".5"'),
         before='<option density="1.2"/>',
     )  # fmt: skip
     scene, left = read_mjcf(text, "here", drop=True)
@@ -93,7 +93,7 @@ def test_the_rest_is_read_and_what_was_left_out_is_listed():
     assert scene.walls == (physics.HalfSpace((0, 0, 1), name="f", friction=0.5),)
     assert [body.friction for body in scene.bodies] == [0.5, 1.0]
     assert scene.effect(physics.Friction) == physics.Friction(1.0, rule="maximum")
-    told = ["line 2: <option> has a medium", "line 6: <body> has 2 geoms", "line 4: <geom 't'> is a fixed capsule"]
+    told = ["line 2: <option> has a medium", "line 6: <body> has 2 geoms", "line 4: <geom 't'> is a fixed cylinder"]
     assert [message.startswith(start) for message, start in zip(left, told)] == [True] * 3
     assert len(left) == 3
 

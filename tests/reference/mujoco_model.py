@@ -141,6 +141,8 @@ def _shape_off(model, data, b: int, body, R: np.ndarray) -> float:
         near = np.linalg.norm(corners[:, None] - points[None], axis=2).min(axis=1).max()
         return float(max(near, np.abs(inside - distance).max()) / scale)
     size = np.full(3, size[0]) if body.kind == "sphere" else size
+    if body.kind == "capsule":  # radius and half the axis, which is along z there
+        size = np.array([size[0], size[0], size[0] + size[1]])
     spread, its = R @ np.diag(body.dimensions**2) @ R.T, axes @ np.diag(size**2) @ axes.T
     return max(_off(here, there, scale), _off(spread, its, float(np.max(size) ** 2)))
 

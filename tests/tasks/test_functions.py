@@ -16,7 +16,7 @@ from rigid_env.envs.checks import CheckError, check_task
 from rigid_env.envs.env import RigidEnv
 from rigid_env.envs.task import TaskEnv, TaskVectorEnv
 from rigid_env.envs.vector_env import RigidVectorEnv
-from rigid_env.tasks import BlockReach, BlockReorient, Entry, Push, Task, Uniform, Wrench, observe
+from rigid_env.tasks import BlockReach, BlockReorient, Choice, Entry, Push, Task, Uniform, Wrench, observe
 from rigid_env.tasks.parameters import LENGTHS
 from tests.tasks.conftest import Free, Slide, started
 
@@ -238,6 +238,26 @@ def test_the_radius_of_a_sphere_is_drawn_by_a_pair():
 def test_sizes_that_a_body_cannot_have_are_refused(draws, words):
     with pytest.raises(ValueError, match=words):
         type("Mixed", (Mixed,), {"draws": draws})()
+
+
+def test_sizes_of_a_capsule_are_whole_sizes():
+    """Two of three numbers are equal: they cannot be drawn one by one, but whole sizes can."""
+
+    class Rod(Free):
+        scene = physics.Scene([physics.Capsule(0.5, 1.0, 3.0)])
+        draws = {"size": Choice([(1.0, 2.0, 1.0), (0.6, 3.0, 0.6)]), "goal": (-1.0, 1.0)}  # noqa: RUF012
+
+    envs = TaskVectorEnv(8, task=Rod)
+    envs.reset(seed=0)
+    sizes = 2.0 * envs.task.world.params[:, at.DIMENSIONS : at.DIMENSIONS + 3]
+    assert {tuple(size) for size in sizes.round(9).tolist()} == {(1.0, 2.0, 1.0), (0.6, 3.0, 0.6)}
+    rods = [physics.Capsule(0.5 * d, whole - d, 3.0) for d, whole, _ in sizes.tolist()]
+    np.testing.assert_allclose(1.0 / envs.task.world.params[:, at.INV_INERTIA], [rod.inertia[0, 0] for rod in rods])
+    drawn = {"size": ((1.0, 2.0, 1.0), (1.2, 3.0, 1.2))}
+    with pytest.raises(ValueError, match="body 0 is a Capsule, of two equal diameters; allowed is Choice"):
+        type("Rod", (Rod,), {"draws": drawn})()
+    with pytest.raises(ValueError, match="'radius', and body 0 is a Capsule"):
+        type("Rod", (Rod,), {"draws": {"radius": (0.2, 0.4)}})()
 
 
 def test_memory_starts_at_zero_and_is_kept_from_step_to_step():

@@ -79,9 +79,9 @@ def test_an_unknown_layer_is_named_with_those_there_are(stage):
 def test_bodies_of_one_shape_are_one_batch(stage, rng):
     bodies = crowd(40, rng)
     stage.show(look_of(bodies))
-    batches = {len(node(stage, f"/scene/bodies/{k}.0").batched_positions) for k in range(3)}
-    assert batches == {10, 20}
-    assert node(stage, "/scene/bodies/3.0") is None
+    batches = {len(node(stage, f"/scene/bodies/{k}.0").batched_positions) for k in range(4)}
+    assert batches == {8, 16}
+    assert node(stage, "/scene/bodies/4.0") is None
     positions = node(stage, "/scene/bodies/1.0").batched_positions
     members = [k for k, body in enumerate(bodies) if body.kind in ("sphere", "ellipsoid")]
     expected = stage.placement.drawn([bodies[k].pos for k in members])
@@ -115,7 +115,7 @@ def test_another_number_of_bodies_makes_new_batches(stage, rng):
         stage.set_layer("axes", True)
         stage.set_layer("bounds", True)
         if count:
-            assert len(node(stage, "/scene/bodies/0.0").batched_positions) == -(-count // 4)
+            assert len(node(stage, "/scene/bodies/0.0").batched_positions) == -(-count // 5)
             assert len(node(stage, "/scene/axes").batched_positions) == count
         else:
             assert node(stage, "/scene/bodies/0.0") is None

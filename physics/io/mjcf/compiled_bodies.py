@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import Model, Pose
 from physics.io.mjcf.shapes import Placed, make_body, make_fixed
@@ -18,7 +19,7 @@ from physics.mass.inertia import MassProperties, compose
 from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
 
-SHAPES = ("box", "sphere", "ellipsoid", "mesh")
+SHAPES = ("box", "sphere", "ellipsoid", "capsule", "mesh")
 TURNED = ("box", "ellipsoid")  # shapes whose axes become the body axes in a scene
 
 # MuJoCo finds principal axes by an iteration, older versions to 2e-7. If its tensor agrees with that of the file to
@@ -84,7 +85,7 @@ def fixed_bodies(model: Model, geoms: list[int], left: LeftOut) -> list[FixedEle
             shape = (_points(model, geom) - frame.pos) @ frame.R
         else:
             shape = _half_axes(kind, m.geom_size[geom])
-        pose = np.concatenate((frame.pos, frame.quat))
+        pose = np.concatenate((frame.pos, capsule_frame(frame.quat) if kind == "capsule" else frame.quat))
         try:
             body = make_fixed(kind, shape, pose, None if name in ("", unnamed(root - 1)) else name)
             found.append(FixedElement(root, geom, body))
@@ -121,6 +122,8 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Body
     frame, joint = model.geom_frames[geom], int(m.body_jntadr[root])
     pose, velocity = _start(model, joint)
     axes = frame.quat if kind in TURNED else np.array([1.0, 0.0, 0.0, 0.0])
+    if kind == "capsule":
+        axes = capsule_frame(frame.quat)
     T = rotation_matrices(axes).T  # from the axes of the model's body to those of the scene's
     if kind == "mesh":
         placed = Placed(kind, _points(model, geom), np.zeros(3), mass)
@@ -191,7 +194,9 @@ def _tensor(model: Model, b: int) -> np.ndarray:
 
 
 def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
-    """Dimensions (3,) [m] of a geom of MuJoCo's `size`: half edges, semi-axes, or three times the radius."""
+    """Dimensions (3,) [m] of a geom of MuJoCo's `size`: half edges, semi-axes, half extents, or thrice the radius."""
+    if kind == "capsule":
+        return capsule_extents(size)
     return np.full(3, size[0]) if kind == "sphere" else np.array(size)
 
 

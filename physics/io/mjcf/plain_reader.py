@@ -11,14 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 from physics import validation
+from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
 from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.shapes import Placed, make_body, make_fixed
+from physics.io.mjcf.shapes import Placed, make_body, make_fixed, uniform_moments
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.io.mjcf.writer import unnamed, wall_name
-from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.mass.inertia import MassProperties, rotate
 from physics.optional import INSTALLED_BY
-from physics.rotations import rotation_matrices
+from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
 from physics.scene.effects import Gravity
 from physics.scene.scene import HalfSpace, Scene
@@ -27,7 +28,7 @@ DENSITY = 1000.0  # MuJoCo's default [kg/m³]
 DEFAULT_GRAVITY = "0 0 -9.81"  # MuJoCo's default [m/s²]
 DEFAULT_FRICTION = "1 0.005 0.0001"  # MuJoCo's defaults for sliding, torsion and rolling
 
-SHAPES = ("box", "sphere", "ellipsoid", "mesh")
+SHAPES = ("box", "sphere", "ellipsoid", "capsule", "mesh")
 
 # For each element that is read: its attributes, and the elements within it.
 ELEMENTS: dict[str, tuple[str, str]] = {
@@ -265,6 +266,8 @@ def _fixed_body(b: int, element: Element, meshes: dict) -> Body:
     pose = np.concatenate((_numbers(element, "pos", 3, "0 0 0"), _unit(element)))
     arm = _numbers(geom, "pos", 3, "0 0 0")
     pose[:3] += rotation_matrices(pose[3:]) @ arm
+    if kind == "capsule":
+        pose[3:] = product(pose[3:], capsule_frame(_unit(geom)))
     name = element.get("name")
     try:
         return make_fixed(kind, shape, pose, None if name in (None, "", unnamed(b)) else name)
@@ -280,7 +283,9 @@ def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray
     geom, kind = geoms[0], _type(geoms[0])
     if kind not in SHAPES:
         raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
-    _refuse(geom, "quat", "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    _refuse(geom, "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+    if kind != "capsule":
+        _refuse(geom, "quat")
     return geom, kind, _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
 
 
@@ -294,6 +299,12 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")
     geom, kind, shape = _only_geom(element, meshes)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
+    if kind == "capsule":
+        axes = capsule_frame(_unit(geom))
+        T = rotation_matrices(axes).T  # from the axes of the element to those of the scene's body
+        placed = placed._replace(pos=T @ placed.pos, mass=placed.mass.placed(R=T))
+        pose = np.concatenate((pose[:3], product(pose[3:], axes)))
+        velocity = np.concatenate((velocity[:3], T @ velocity[3:]))
     name = element.get("name")
     try:
         return make_body(placed, pose, velocity, None if name in (None, "", unnamed(b)) else name)
@@ -312,7 +323,9 @@ def _points(geom: Element, meshes: dict) -> np.ndarray:
 
 
 def _half_axes(geom: Element) -> np.ndarray:
-    """Dimensions (3,) [m] of a geom: half edges, semi-axes, or three times the radius."""
+    """Dimensions (3,) [m] of a geom: half edges, semi-axes, half extents, or three times the radius."""
+    if _type(geom) == "capsule":
+        return capsule_extents(_numbers(geom, "size", 2))
     return np.resize(_numbers(geom, "size", 1 if _type(geom) == "sphere" else 3), 3)
 
 
@@ -336,16 +349,20 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
     """Mass properties of a geom with uniform density, in the frame of its body."""
     if _type(geom) == "mesh":
         raise _unread(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
-    is_box = _type(geom) == "box"
+    kind = _type(geom)
     if geom.get("mass") is not None:
         mass = float(_numbers(geom, "mass", 1)[0])
     else:
-        volume = float(np.prod(shape)) * (8.0 if is_box else 4 * np.pi / 3)
+        volume = float(np.prod(shape)) * (8.0 if kind == "box" else 4 * np.pi / 3)
+        if kind == "capsule":
+            volume = float(np.pi * shape[0] ** 2 * (2 * (shape[1] - shape[0]) + 4 / 3 * shape[0]))
         mass = volume * float(_numbers(geom, "density", 1, str(DENSITY))[0])
     if not mass > 0:
         raise _error(geom, f"has the mass {mass:g}; allowed is more than 0")
-    moments = block_moments(2 * shape, mass) if is_box else ellipsoid_moments(shape, mass)
-    return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), np.diag(moments))
+    inertia = np.diag(uniform_moments(kind, shape, mass))
+    if kind == "capsule":
+        inertia = rotate(inertia, rotation_matrices(capsule_frame(_unit(geom))))
+    return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), inertia)
 
 
 def _condim(element: Element, default: int) -> int:

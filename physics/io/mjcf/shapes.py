@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.mass.inertia import MassProperties, block_moments, ellipsoid_moments
+from physics.mass.inertia import MassProperties, block_moments, capsule_moments, ellipsoid_moments
 from physics.mass.polyhedron import convex_hull
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
+from physics.scene.capsule import Capsule
 
 # Share to which an inertia counts as that of uniform density, and a geom as at the centre of mass: the rounding errors
 # of a text, and of rotations there and back.
@@ -26,11 +27,11 @@ class Placed(NamedTuple):
     Attributes
     ----------
     kind : str
-        Kind of the geom: "box", "sphere", "ellipsoid" or "mesh".
+        Kind of the geom: "box", "sphere", "ellipsoid", "capsule" or "mesh".
     shape : (3,) or (n, 3) float64
-        Half edges, semi-axes, or three times the radius [m]. Of a mesh its points relative to `pos` [m].
+        Half edges, semi-axes, half extents, or three times the radius [m]. Of a mesh its points relative to `pos` [m].
     pos : (3,) float64
-        Centre of the geom [m]. Its axes are those of the body.
+        Centre of the geom [m]. Its axes are those of the body; the axis of a capsule is body y.
     mass : MassProperties
         Mass, centre of mass and inertia of the body.
     """
@@ -88,14 +89,22 @@ def make_fixed(kind: str, shape: np.ndarray, pose: np.ndarray, name: str | None)
     start["pos"] = pose[:3]
     if kind == "box":
         return Block(tuple(2 * shape), **start)
+    if kind == "capsule":
+        return Capsule(float(shape[0]), 2 * float(shape[1] - shape[0]), **start)
     return Sphere(float(shape[0]), **start) if kind == "sphere" else Ellipsoid(tuple(shape), **start)
 
 
+def uniform_moments(kind: str, shape: np.ndarray, mass: float) -> np.ndarray:
+    """Principal moments (3,) [kg m²] of a geom other than a mesh, of uniform density."""
+    if kind == "box":
+        return block_moments(2 * shape, mass)
+    return capsule_moments(shape, mass) if kind == "capsule" else ellipsoid_moments(shape, mass)
+
+
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:
-    """Make a box, sphere or ellipsoid; `inertia_body` is given if the inertia is not that of uniform density."""
+    """Make a body that is no hull; `inertia_body` is given if the inertia is not that of uniform density."""
     half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
-    moments = block_moments(2 * half, mass) if placed.kind == "box" else ellipsoid_moments(half, mass)
-    is_uniform = _is_near(placed.mass.inertia, np.diag(moments), UNIFORM)
+    is_uniform = _is_near(placed.mass.inertia, np.diag(uniform_moments(placed.kind, half, mass)), UNIFORM)
     if (is_uniform or placed.kind != "box") and _is_rounding(arm, placed):
         arm = np.zeros(3)
     if arm.any() or not is_uniform:
@@ -106,6 +115,8 @@ def _convex(placed: Placed, start: dict[str, Any]) -> Body:
         raise ValueError(f"its {placed.kind} is {arm.tolist()} m from the centre of mass; allowed is that of a box")
     if placed.kind == "sphere":
         return Sphere(float(half[0]), mass, **start)
+    if placed.kind == "capsule":
+        return Capsule(float(half[0]), 2 * float(half[1] - half[0]), mass, **start)
     return Ellipsoid(tuple(half), mass, **start)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from physics.io.mjcf.capsule_frames import OF_GEOM
 from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import rotation_matrices
 from physics.scene.effects import Contact, Friction, Gravity
@@ -20,7 +21,7 @@ from physics.scene.force_fields import Spring
 from physics.scene.groups import assign_groups, touching_pairs
 from physics.scene.scene import Scene
 
-GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh"}
+GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule"}
 KEYFRAME = "start"
 MOST_BITS = 2**30  # MuJoCo's masks are integers of 32 bits with a sign
 
@@ -124,7 +125,7 @@ def _inexpressible(scene: Scene) -> list:
     contact = scene.effect(Contact)
     rebounds = contact and (contact.restitution or any(mu for _, _, mu in contact.restitution_pairs))
     lost: list[Any] = [contact] if contact and (rebounds or contact.tangential or contact.stiffness) else []
-    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution]
+    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution or getattr(item, "motion", None)]
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
@@ -190,6 +191,8 @@ def _add_body(world: ET.Element, b: int, body, touch: dict, surface: dict, sprin
         ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
+    if body.kind == "capsule":
+        extent = {"size": _text((body.radius, 0.5 * body.length)), "quat": _text(OF_GEOM)}
     shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
     ET.SubElement(element, "geom", **shape, **touch, **surface)
     for k, spring in enumerate(springs):

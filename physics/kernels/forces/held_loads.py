@@ -190,6 +190,16 @@ def refresh_loads(y, later, offset_frame, body):
         body.is_felt = 1
 
 
+def _start_of_clock(clock, body):
+    return clock[0]
+
+
+@if_declared(_start_of_clock)
+def call_start(clock, body):
+    """Time of the world at the start of the call [s]: of the body's fields, or `clock[0]` in scenes without fields."""
+    return body.call_start
+
+
 @if_declared(False)
 def has_fields(body):
     """True if the scene declares a force field."""

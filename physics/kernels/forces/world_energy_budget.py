@@ -70,6 +70,15 @@ def note_stage_energy(offset_frame, bodies, first):
         m[10], m[11], m[12] = L
 
 
+@if_declared()
+def grant_energy(work, first):
+    """Let the stage raise the energy by `work` [J], which other things have done; `first` is as in `note_stage_energy`.
+
+    These are bodies with a prescribed motion.
+    """
+    first.stage_energy += work
+
+
 @kernel
 def _gain_of(b, h, offset_frame, bodies):
     """Gain of kinetic energy of body b in a stage of length h, less work done on it [J], and a scale of its rounding.

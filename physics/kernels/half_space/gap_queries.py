@@ -21,12 +21,15 @@ def principal_matrix(state, params, i):
 
 @entry_kernel
 def write_angular_momenta(rows, state, params):
-    """Write angular momenta L = R I Rᵀ ω [kg m²/s] into the given rows of `state`, from their angular velocities ω."""
+    """Write angular momenta L = R I Rᵀ ω [kg m²/s] into the given rows of `state`, from their angular velocities ω.
+
+    That of a fixed body is 0.
+    """
     for k in range(rows.shape[0]):
         i = rows[k]
         w = (state[i, at.ANGVEL], state[i, at.ANGVEL + 1], state[i, at.ANGVEL + 2])
         L = (0.0, 0.0, 0.0)
-        if w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0:
+        if params[i, at.INV_MASS] != 0.0 and (w[0] != 0.0 or w[1] != 0.0 or w[2] != 0.0):
             R = principal_matrix(state, params, i)
             m = qt.transposed_matvec(R, w)
             j = at.INV_INERTIA
@@ -36,7 +39,7 @@ def write_angular_momenta(rows, state, params):
 
 @entry_kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
-    """Find the smallest gap of each given row over all walls; hulls are not supported.
+    """Find the smallest gap of each given row over all walls; hulls and capsules are not supported.
 
     Written are `gaps` (len(rows),) [m] and `which` (len(rows),), the index of the wall, or -1 without walls.
     """

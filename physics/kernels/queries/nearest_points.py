@@ -12,6 +12,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
+from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix
 from physics.kernels.multibody.data.hull_tables import FIRST_EDGE, FIRST_FACE, LAST_EDGE, LAST_FACE
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
@@ -25,6 +26,7 @@ from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
 from physics.kernels.multibody.narrowphase.gjk import support_point
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import direction_from_edge, hull_separation, nearest_on_hull
 from physics.kernels.multibody.narrowphase.hull_pose import is_above_face, pose_hull
+from physics.kernels.queries.nearest_of_capsules import nearest_of_capsule, nearest_on_capsule
 from physics.kernels.queries.polyhedra_distance import nearest_of_polyhedra
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
@@ -44,6 +46,8 @@ def nearest_on_body(b, x, scratch):
     """Nearest point of the surface of body b to a point x: (distance, n out of b, point); negative for x inside."""
     center, R, dims = row_vector(scratch.bodies.center, b, 0), row_matrix(scratch.bodies.rotation, b), _dims(b, scratch)
     arm, shape = minus(x, center), scratch.bodies.body[b].shape
+    if is_capsule(b, scratch):
+        return nearest_on_capsule(b, x, scratch)
     if shape == SPHERE:
         n = center_direction(arm)
         return math.sqrt(qt.dot(arm, arm)) - dims[0], n, add_scaled(center, dims[0], n)
@@ -121,6 +125,11 @@ def _nearest_in_order(a, b, scratch):
 @kernel
 def nearest_of_bodies(a, b, scratch):
     """Nearest points of bodies a and b of any shapes."""
+    if is_capsule(a, scratch):
+        return nearest_of_capsule(a, b, scratch)
+    if is_capsule(b, scratch):
+        gap, n, q, p = nearest_of_capsule(b, a, scratch)
+        return gap, times(-1.0, n), p, q
     if _is_first(a, b, scratch):
         return _nearest_in_order(a, b, scratch)
     gap, n, q, p = _nearest_in_order(b, a, scratch)

@@ -27,6 +27,7 @@ class PosedBodies(NamedTuple):
     body: np.ndarray  # (bodies,) records: shape code, half edges or semi-axes [m], bounding radius about `center` [m]
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
     rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
+    capsules: bool | None  # None if neither a body nor the shape is a capsule
 
 
 class PairScratch(NamedTuple):
@@ -57,7 +58,7 @@ class QueriedBodies(NamedTuple):
     shapes: np.ndarray  # (bodies,) codes of shapes
 
 
-def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence) -> QueryScratch:
+def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence, capsules: bool | None) -> QueryScratch:
     """Allocate the scratch memory of one thread.
 
     Parameters
@@ -69,12 +70,14 @@ def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence) -> Q
     polyhedra : sequence
         Polyhedron of each body as `hull_tables.make_hulls` takes them, of blocks, too; None for a round body. Further
         ones are those of shapes that are no bodies of the world.
+    capsules : True or None
+        Whether some of these bodies and shapes are capsules.
     """
     rows = len(polyhedra)
     records = np.zeros(rows, np.dtype([("shape", np.int64), ("dims", np.float64, (3,)), ("radius", np.float64)]))
     hulls = make_hulls(polyhedra)
     return QueryScratch(
-        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9))),
+        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9)), capsules),
         PairScratch(*(np.zeros((4, 3)) for _ in range(4)), hulls, _face_offsets(hulls)),
         make_box_tree(bodies),
         walls.copy(),

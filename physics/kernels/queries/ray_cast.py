@@ -10,6 +10,7 @@ import numpy as np
 from physics.compiler.decorators import entry_kernel, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
+from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
 from physics.kernels.multibody.data.hull_tables import FIRST_FACE, LAST_FACE
 from physics.kernels.parallel.work_stealing import for_each_world
@@ -17,6 +18,7 @@ from physics.kernels.queries.box_tree import build_tree, find_bodies, safe_inver
 from physics.kernels.queries.query_scratch import pose_world
 from physics.kernels.queries.ray_shapes import (
     ray_block,
+    ray_capsule,
     ray_ellipsoid,
     ray_plane,
     ray_polyhedron,
@@ -60,7 +62,9 @@ def _ray_body(b, o, d, scratch):
     if shape == SPHERE:
         return ray_sphere(arm, d, dims[0])
     arm, way, dims = qt.transposed_matvec(R, arm), qt.transposed_matvec(R, d), (dims[0], dims[1], dims[2])
-    if shape == BLOCK:
+    if is_capsule(b, scratch):
+        t, n = ray_capsule(arm, way, dims)
+    elif shape == BLOCK:
         t, n = ray_block(arm, way, dims)
     elif shape == HULL:
         hulls, offsets = scratch.narrowphase.hulls, scratch.narrowphase.face_offsets

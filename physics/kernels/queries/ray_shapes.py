@@ -108,6 +108,61 @@ def ray_block(o, d, dims):
     return last, _axis_normal(leave, d, 1.0)
 
 
+@inlined
+def _stay(a, b, square):
+    """First and last root t of a t² + 2 b t + b²/a = `square`; no roots: (inf, -inf)."""
+    if not square >= 0.0:
+        return math.inf, -math.inf
+    half = math.sqrt(square / a)
+    return -b / a - half, -b / a + half
+
+
+@inlined
+def _stay_in_ball(o, d, radius):
+    """First and last t at which a ray is in a ball about the origin, as in `ray_sphere`; none: (inf, -inf)."""
+    b = qt.dot(o, d)
+    p = plus(o, times(-b, d))
+    return _stay(1.0, b, radius * radius - qt.dot(p, p))
+
+
+@inlined
+def _stay_in_tube(o, d, radius, half):
+    """First and last t at which a ray is in a cylinder along y from -half to half; none: first > last.
+
+    Across the axis it is a ball, and along it a slab.
+    """
+    first, last = _slab(o[1], d[1], half)
+    a, b = d[0] * d[0] + d[2] * d[2], o[0] * d[0] + o[2] * d[2]
+    if not a > 0.0:
+        if o[0] * o[0] + o[2] * o[2] > radius * radius:
+            return math.inf, -math.inf
+        return first, last
+    x, z = o[0] - b / a * d[0], o[2] - b / a * d[2]
+    enter, leave = _stay(a, b, radius * radius - (x * x + z * z))
+    return max(first, enter), min(last, leave)
+
+
+@inlined
+def ray_capsule(o, d, dims):
+    """First point of a ray on a capsule along y with half extents `dims`.
+
+    The ray is inside from the first to the last time at which it is in the cylinder or in one of two balls.
+    """
+    r, half = dims[0], dims[1] - dims[0]
+    near, last = _stay_in_tube(o, d, r, half)
+    if near > last:
+        near, last = math.inf, -math.inf
+    for end in range(2):
+        first, leave = _stay_in_ball((o[0], o[1] - (2.0 * end - 1.0) * half, o[2]), d, r)
+        near, last = min(near, first), max(last, leave)
+    if near > last or last < 0.0:
+        return MISS
+    t = near if near >= 0.0 else last
+    x = plus(o, times(t, d))
+    n = (x[0], x[1] - min(max(x[1], -half), half), x[2])
+    return t, times(1.0 / math.sqrt(qt.dot(n, n)), n)
+
+
 @kernel
 def ray_polyhedron(o, d, first, last, normals, offsets):
     """First point of a ray on a convex polyhedron: the ray is inside while it is below the planes of all faces.

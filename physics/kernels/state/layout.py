@@ -22,7 +22,7 @@ STATE_SIZE = 16
 INV_MASS = 0  # [1/kg]
 INV_INERTIA = 1  # inverse principal moments [1/(kg m²)]
 DIMENSIONS = (
-    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, reach of a hull [m]
+    4  # half edges of a block, semi-axes of an ellipsoid, radius (three times) of a sphere, else half extents [m]
 )
 RADIUS = 7  # of the bounding sphere about the centre of mass [m]
 FRICTION = 8  # Coulomb coefficient against the walls
@@ -44,6 +44,7 @@ BLOCK = 0
 SPHERE = 1
 ELLIPSOID = 2
 HULL = 3  # corners are in the tables `many.hulls`
+CAPSULE = 4
 
 # Contact features of a block at a wall: its eight vertices. Spheres and ellipsoids have one, their lowest point.
 VERTEX_COUNT = 8

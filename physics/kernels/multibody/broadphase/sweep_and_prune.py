@@ -16,6 +16,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.grid import body_strips, fill_columns
 from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
+from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 from physics.kernels.multibody.data.fixed_bodies import may_form_pair
@@ -82,6 +83,8 @@ def half_extent(b, axis, many):
     R, d, shape = many.bodies.rotation, many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return d[0]
+    if is_capsule(b, many):
+        return half_length(b, many) * abs(R[b, 3 * axis + 1]) + d[0]
     if shape == HULL:
         shape = BLOCK
     e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])

@@ -29,11 +29,13 @@ from physics.kernels.multibody.data.arrays import (
     BodiesWorkspace,
     BroadPhase,
     ContactSet,
+    DrivenBodies,
     Islands,
     LinearSystem,
     NarrowPhase,
     Newton,
     PairMaterials,
+    StageStart,
     Sweeps,
     WorldSnapshots,
 )
@@ -102,7 +104,9 @@ def make_bodies_workspace(
     fixed: np.ndarray | None = None,
     *,
     groups: np.ndarray | None = None,
+    capsules: bool | None = None,
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
+    motion_columns: int = 0,
     **settings: float,
 ) -> BodiesWorkspace:
     """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
@@ -121,16 +125,20 @@ def make_bodies_workspace(
         1 for each fixed body, 0 for others; copied. None: no body is fixed.
     groups : array (bodies + walls, 2) int64, optional
         Collision group and mask of each body, then of each wall; copied. None: all may touch.
+    capsules : True or None
+        Whether some bodies are capsules.
     materials : tuple of two
         Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
         bodies, None: the default rules.
+    motion_columns : int
+        Columns of a prescribed motion (`flight.prescribed_motion`); 0: no body has one.
     settings : float
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups),
+        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -140,6 +148,7 @@ def make_bodies_workspace(
         newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
         walls=walls.copy(),
         materials=materials[1],
+        driven=_make_driven(bodies, contacts, motion_columns),
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )
@@ -152,6 +161,7 @@ def _make_bodies(
     relative_slop: float,
     fixed: np.ndarray | None,
     groups: np.ndarray | None,
+    capsules: bool | None,
 ) -> Bodies:
     records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
@@ -173,6 +183,7 @@ def _make_bodies(
         lift_work=np.zeros(bodies),
         fixed=None if fixed is None else fixed.copy(),
         groups=None if groups is None else groups.copy(),
+        capsules=capsules,
     )
 
 
@@ -279,6 +290,18 @@ def _make_newton(bodies: int, batches: int) -> Newton:
         change=np.zeros((bodies, COLUMN_SIZE)),
         batch=np.zeros((batches, BATCH_SIZE), np.int64),
         lanes=np.zeros((batches, LANES_SIZE)),
+    )
+
+
+def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | None:
+    if not columns:
+        return None
+    return DrivenBodies(
+        columns=np.zeros((bodies, columns)),
+        clock=np.zeros(2),
+        velocity=np.zeros((contacts, 3)),
+        target=np.zeros((contacts, 3)),
+        start=StageStart(np.zeros((bodies, STATE_SIZE)), np.zeros((contacts, 3)), np.zeros((contacts, 3))),
     )
 
 

@@ -104,6 +104,7 @@ class Bodies(NamedTuple):
     lift_work: np.ndarray  # (bodies,) work that `position_correction` does against the loads [J]
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
     groups: np.ndarray | None  # (bodies + walls, 2) int, group and mask of each; None in a world where all may touch
+    capsules: bool | None  # None in a world without capsules
 
 
 class BroadPhase(NamedTuple):
@@ -218,6 +219,24 @@ class PairMaterials(NamedTuple):
     restitution: np.ndarray  # (m,) coefficients of restitution of these pairs
 
 
+class StageStart(NamedTuple):
+    """Copies of a stage's start, from which `stepping.slip_end` makes it again."""
+
+    state: np.ndarray  # (bodies, STATE_SIZE) states of the bodies
+    target: np.ndarray  # (contacts, 3) targets of the contacts [m/s]
+    slip: np.ndarray  # (contacts, 3) slip of the first end on the second one, world frame [m/s]
+
+
+class DrivenBodies(NamedTuple):
+    """Prescribed motions of fixed bodies, and their part in contacts; see `driven_bodies`."""
+
+    columns: np.ndarray  # (bodies, ...) motion of each body, columns of `flight.prescribed_motion`
+    clock: np.ndarray  # (2,) time of the world at the start of the call, and now [s]
+    velocity: np.ndarray  # (contacts, 3) velocity of the second end, world frame; 0 unless it is driven [m/s]
+    target: np.ndarray  # (contacts, 3) during a solve: targets relative to the driven ends [m/s]
+    start: StageStart
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -231,5 +250,6 @@ class BodiesWorkspace(NamedTuple):
     newton: Newton
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
     materials: PairMaterials | None  # None: the default rules, and no exceptions
+    driven: DrivenBodies | None  # None: the scene declares no motion
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

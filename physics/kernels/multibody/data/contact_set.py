@@ -10,6 +10,9 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
+from physics.kernels.multibody.data.capsule_axes import normal_between_axes
+from physics.kernels.multibody.data.capsules import is_capsule
+from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
@@ -95,7 +98,7 @@ def write_contact_frame(k, n, many):
 def relative_velocity(k, t, many):
     """Velocity of contact k's point on the first body relative to that on the second, world frame [m/s].
 
-    t (bodies, 6) holds the twists of all bodies.
+    t (bodies, 6) holds the twists of all bodies. A second body that is fixed counts as still even if it is driven.
     """
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
     u = add_scaled(row_vector(t, a, 0), 1.0, qt.cross(row_vector(t, a, 3), row_vector(many.contacts.arm, k, 0)))
@@ -104,6 +107,12 @@ def relative_velocity(k, t, many):
             u, add_scaled(row_vector(t, b, 0), 1.0, qt.cross(row_vector(t, b, 3), row_vector(many.contacts.arm, k, 3)))
         )
     return u
+
+
+@inlined
+def slip_velocity(k, many):
+    """Velocity of contact k's point on the first body relative to that on the second, which may be driven [m/s]."""
+    return relative_to_driven(k, relative_velocity(k, many.bodies.twist, many), many)
 
 
 @inlined
@@ -162,7 +171,7 @@ def _may_turn_far(a, b, many):
 @inlined
 def relative_acceleration_bound(k, many):
     """Bound of the acceleration of contact k's two points relative to each other, without contact impulses [m/s²]."""
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
     if b < 0:
         return many.bodies.body[a].acceleration
     return many.bodies.body[a].acceleration + many.bodies.body[b].acceleration
@@ -180,14 +189,16 @@ def _combine_materials(k, a, b, many):
 
 
 @inlined
-def _write_anchor(k, b, first, point, many):
+def _write_anchor(k, b, first, point, n, many):
     """Write arm and anchor of contact k for its end on body b, at `point` (world frame) [m].
 
-    Both lead from the body's centre of mass to the point, in the world frame and in the body frame. `first` is the
-    column of this end.
+    Both lead from the body's centre of mass to the point, in the world frame and in the body frame. The anchor of a
+    capsule leads to the point of its axis above, along the contact's normal n. `first` is the column of this end.
     """
     arm = subtract(point, row_vector(many.bodies.state, b, 0))
     put_vector(many.contacts.arm, k, first, arm)
+    if is_capsule(b, many):
+        arm = add_scaled(arm, many.bodies.body[b].dims[0] if first == 0 else -many.bodies.body[b].dims[0], n)
     put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, b), arm))
 
 
@@ -196,7 +207,8 @@ def _first_body_share(a, b, many):
     """Weight of body a's contact point in the common contact point of a and b, for a normal that neither body owns.
 
     The weight is 1 if a is rounder than b, 0 if b is rounder than a, else 1/2: the point of a round body stays under
-    its centre. A sphere is rounder than an ellipsoid, and an ellipsoid is rounder than a block or a hull.
+    its centre. A sphere is rounder than a capsule, a capsule is rounder than an ellipsoid, and an ellipsoid is rounder
+    than a block or a hull.
     """
     one, other = many.bodies.body[a].shape, many.bodies.body[b].shape
     if one != other:
@@ -204,6 +216,10 @@ def _first_body_share(a, b, many):
             if one == shape:
                 return 1.0
             if other == shape:
+                return 0.0
+            if is_capsule(a, many):
+                return 1.0
+            if is_capsule(b, many):
                 return 0.0
     return 0.5
 
@@ -225,6 +241,15 @@ def _join_points(k, a, b, owner, gap, n, many):
         other = add_scaled(one, 1.0, way)
     put_vector(many.contacts.arm, k, 0, subtract(other, way))
     put_vector(many.contacts.arm, k, 3, other)
+
+
+@inlined
+def end_of_pair(k, n, many):
+    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        k += 1
+    return k
 
 
 @inlined
@@ -270,17 +295,18 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     a, b, normal, points = moving_first(a, b, normal, points, many)
     end = end_of(b, many)
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, end
-    _write_anchor(k, a, 0, points[0], many)
+    _write_anchor(k, a, 0, points[0], normal, many)
     acceleration = many.bodies.body[a].acceleration
     partner = count - 1 - b
     if b >= 0:
-        _write_anchor(k, b, 3, points[1], many)
+        _write_anchor(k, b, 3, points[1], normal, many)
         if owner != PARTED:
             _join_points(k, a, b, owner, gap, normal, many)
         acceleration += many.bodies.body[b].acceleration
         partner = b
     write_contact_frame(k, normal, many)
-    speed = qt.dot(normal, relative_velocity(k, many.bodies.twist, many))
+    take_driven_velocity(k, many)
+    speed = qt.dot(normal, slip_velocity(k, many))
     slop = pair_slop(a, b, many)
     is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop
     if is_out_of_reach and not (_may_turn_far(a, b, many) and gap <= arrival_gap(a, b, many)):
@@ -323,7 +349,8 @@ def _carried_point(b, k, first, side, n, many):
     """Arm of body b in contact k after its motion since the contact was found, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
-    contact. `first` is the column of the body's anchor; `side` is -1 for the first body and 1 for the second.
+    contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
+    body's anchor; `side` is -1 for the first body and 1 for the second.
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
@@ -332,15 +359,16 @@ def _carried_point(b, k, first, side, n, many):
     if shape == ELLIPSOID:
         dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m))
-    return qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
+    arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
+    return add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm
 
 
 @inlined
 def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its bodies a and b; return its normal, world frame.
 
-    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres. Any
-    other normal stays as it is.
+    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres, and
+    that of two balls of capsules likewise. Any other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -352,6 +380,9 @@ def _turn_frame(k, a, b, many):
         if size > 0.0:
             n = (d[0] / size, d[1] / size, d[2] / size)
             write_contact_frame(k, n, many)
+    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
+        n = normal_between_axes(k, a, b, n, many)
+        write_contact_frame(k, n, many)
     return n
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.half_space.contact_point import geometric_center
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.data.driven_bodies import drift_driven_bodies, is_driven
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, principal_attitude, read_state
 
@@ -44,3 +45,12 @@ def update_poses_and_twists(offset_frame, many):
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
         q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)
         put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], offset_frame))
+
+
+@if_given("many.driven")
+def move_driven_bodies(h, offset_frame, many):
+    """Move all driven bodies by the time h [s], and compute their new poses."""
+    drift_driven_bodies(h, many)
+    for b in range(many.bodies.state.shape[0]):
+        if is_driven(b, many):
+            update_body_pose(b, offset_frame, many)

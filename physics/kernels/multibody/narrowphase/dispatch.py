@@ -14,6 +14,8 @@ from physics.kernels.multibody.data.contact_set import pair_slop
 from physics.kernels.multibody.data.sleeping import wake_touched_groups
 from physics.kernels.multibody.narrowphase.body_wall import collide_body_wall, collide_hull_wall
 from physics.kernels.multibody.narrowphase.box_box import collide_blocks
+from physics.kernels.multibody.narrowphase.capsule import collide_capsule
+from physics.kernels.multibody.narrowphase.capsule_contacts import collide_capsule_wall
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import collide_ellipsoid
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import collide_ellipsoid_hull, collide_sphere_hull
 from physics.kernels.multibody.narrowphase.hull_hull import collide_hulls
@@ -50,7 +52,8 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
                 if bodies[b].shape == HULL:
                     collide_hull_wall(b, wall, margin, h, many)
                     continue
-            collide_body_wall(b, wall, margin, h, many)
+            if not collide_capsule_wall(b, wall, margin, h, many):
+                collide_body_wall(b, wall, margin, h, many)
     for k in range(many.counts[NUM_PAIRS]):
         a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
         if is_asleep(first_row + a, sleep) or (is_fixed(a, many.bodies) and is_asleep(first_row + b, sleep)):
@@ -58,6 +61,8 @@ def find_contacts(h, ellipsoids, hulls, world, sleep, many):
         if not may_meet(a, b, h, many):
             continue
         margin = surface_motion_bound(a, h, many) + surface_motion_bound(b, h, many) + pair_slop(a, b, many)
+        if collide_capsule(a, b, margin, h, ellipsoids, many):
+            continue
         first, second = bodies[a].shape, bodies[b].shape
         if hulls is not None:
             if ellipsoids is not None:  # noqa: SIM102 (as above)

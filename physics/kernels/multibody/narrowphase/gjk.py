@@ -3,8 +3,8 @@
 The differences of points of body a and body b fill a convex body, the Minkowski difference A - B. Its point v nearest
 to the origin is the shortest vector between the bodies. Each iteration finds w, the point of A - B farthest along -v.
 It adds w to a simplex and replaces v by the simplex's point nearest to the origin. The distance is between the bound
-v·w/|v| and |v|. A sphere is replaced by its centre, and its radius is subtracted at the end, so that its distance is
-exact.
+v·w/|v| and |v|. A sphere is replaced by its centre and a capsule by its axis. Their radius is subtracted at the end, so
+that their distance is exact.
 
 Reference: E. G. Gilbert, D. W. Johnson, S. S. Keerthi, *A fast procedure for computing the distance between complex
 objects in three-dimensional space*, IEEE J. Robotics and Automation 4, 1988.
@@ -17,6 +17,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.capsules import farthest_axis_end, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, LAST_CORNER
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
@@ -50,6 +51,8 @@ def support_point(b, x, R, k, thinner, hulls, many):
     d, shape = many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return add_scaled(x, d[0] - thinner, k)
+    if is_capsule(b, many):
+        return add_scaled(add_scaled(x, 1.0, farthest_axis_end(b, R, k, many)), d[0] - thinner, k)
     e = qt.transposed_matvec(R, k)
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
@@ -66,12 +69,14 @@ def support_point(b, x, R, k, thinner, hulls, many):
 
 @inlined
 def _core_point(b, x, R, k, thinner, hulls, many):
-    """Farthest point along k of the core of body b: the centre x of a sphere, else its `support_point`.
+    """Farthest point along k of the core of body b: centre x of a sphere, end of a capsule's axis, or `support_point`.
 
     The vector k may have any length here. For R, `thinner` and `hulls` see `support_point`.
     """
     if many.bodies.body[b].shape == SPHERE:
         return x
+    if is_capsule(b, many):
+        return add_scaled(x, 1.0, farthest_axis_end(b, R, k, many))
     return support_point(b, x, R, k, thinner, hulls, many)
 
 
@@ -79,8 +84,8 @@ def _core_point(b, x, R, k, thinner, hulls, many):
 def _difference_point(a, b, poses, v, thinner, hulls, many):
     """Point of the Minkowski difference A - B that reaches farthest along -v, from the cores of bodies a and b.
 
-    `poses` has (geometric centre, rotation matrix) of a and of b. The core of a sphere is its centre, that of another
-    body the body shrunk by `thinner` [m]. `hulls` is None if the scene has no hulls.
+    `poses` has (geometric centre, rotation matrix) of a and of b. The core of a sphere is its centre, that of a capsule
+    its axis, and that of another body the body shrunk by `thinner` [m]. `hulls` is None if the scene has no hulls.
     """
     one, other = poses
     x, y = subtract(one[0], other[0]), (0.0, 0.0, 0.0)
@@ -143,8 +148,9 @@ def closest_on_simplex(count, many):
 
 @inlined
 def _core_radius(b, thinner, many):
-    """Radius that is added to the core of body b [m]: that of a sphere shrunk by `thinner`, 0 for other shapes."""
-    return many.bodies.body[b].dims[0] - thinner if many.bodies.body[b].shape == SPHERE else 0.0
+    """Radius that is added to the core of body b [m]: that of a sphere or capsule shrunk by `thinner`, else 0."""
+    is_core = many.bodies.body[b].shape == SPHERE or is_capsule(b, many)
+    return many.bodies.body[b].dims[0] - thinner if is_core else 0.0
 
 
 @kernel

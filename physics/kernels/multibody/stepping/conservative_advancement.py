@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel
-from physics.kernels.flight.free_flight import fly
 from physics.kernels.half_space.conservative_advancement import (
     CHORDS,
     FAR_TURN,
@@ -38,9 +37,11 @@ from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.broadphase.sweep_and_prune import may_meet, may_reach_wall
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
+from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
+from physics.kernels.multibody.data.driven_bodies import acceleration_of, spin_of, state_after
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
-from physics.kernels.state.body import angular_velocity, read_state
+from physics.kernels.state.body import read_state
 from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.layout import HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
@@ -112,7 +113,7 @@ def _contact_side(b, y, n, offset_frame, many):
     if offset_frame is not None:
         c = center_arm(R, many.bodies.body[b])
     if not (many.bodies.body[b].shape == SPHERE and is_centred(offset_frame, many.bodies.body[b])):
-        m = qt.cross(n, angular_velocity(q, L, many.bodies.body[b], offset_frame))
+        m = qt.cross(n, spin_of(b, q, L, offset_frame, many))
     return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
 
 
@@ -127,6 +128,8 @@ def _support(b, R, k, hulls, many):
         if shape == HULL:
             e = qt.transposed_matvec(R, k)
             return qt.dot(e, hull_support_vertex(b, e, many))
+    if is_capsule(b, many):
+        return capsule_support(b, R, k, many)
     return support_of_vector(shape, (d[0], d[1], d[2]), R, k)
 
 
@@ -194,7 +197,7 @@ def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
 def _turning_acceleration(b, h, offset_frame, many):
     """Bound of the acceleration [m/s²] that the rotation of body b gives to its points within h [s]."""
     if is_fixed(b, many.bodies):
-        return 0.0
+        return acceleration_of(b, many)
     _, q, _, L = read_state(many.bodies.state, b)
     spin = many.bodies.spin_bound[b]
     if not spin > 0.0:
@@ -255,9 +258,9 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
         gone += step
         if not gone < first:
             return first
-        one = fly(one, many.bodies.body[a], step, gyroscopic, offset_frame)
+        one = state_after(a, one, gone - step, step, gyroscopic, offset_frame, many)
         if b >= 0:
-            other = fly(other, many.bodies.body[b], step, gyroscopic, offset_frame)
+            other = state_after(b, other, gone - step, step, gyroscopic, offset_frame, many)
     return gone
 
 

@@ -17,8 +17,10 @@ from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data.arrays import LOADED_MOMENTA, PRE_LOAD_VELOCITY
+from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
+from physics.kernels.multibody.data.driven_bodies import driven_velocity, driven_work
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
@@ -55,7 +57,7 @@ def has_gained_energy(n, h, many):
     ½ P·(v + v') + ½ Q·(ω + ω'), from velocities before the stage to v' and ω' after it. A contact with the impulse p
     may keep a residual r = tolerance · s, with the largest free speed s, and so add ½ p r. In a tower this is far more
     than the energy of its bodies. But no contact needs an impulse above the sum F of all loads to hold them; the rest
-    of p is internal strain.
+    of p is internal strain. Driven bodies do the work Σ p·w, which is no gain.
     """
     gain = size = fastest = F = 0.0
     for b in range(many.bodies.state.shape[0]):
@@ -83,7 +85,10 @@ def has_gained_energy(n, h, many):
     held = 0.0
     for k in range(n):
         held += min(many.contacts.impulse[k, 0], F)
-    tolerance = many.settings[0].tolerance
+        w = driven_velocity(k, many)
+        fastest = max(fastest, qt.dot(w, w))
+    tolerance, work = many.settings[0].tolerance, 2.0 * driven_work(n, many)
+    gain, size = gain - work, size + abs(work)
     return gain > max(tolerance, ENERGY_GAIN_TOLERANCE) * size + tolerance * math.sqrt(fastest) * held
 
 
@@ -162,7 +167,9 @@ def clamp_body_inside_walls(b, many):
             continue
         was_outside = True
         reach = body.radius
-        if body.shape != HULL:
+        if is_capsule(b, many):
+            reach = capsule_support(b, row_matrix(many.bodies.rotation, b), n, many)
+        elif body.shape != HULL:
             reach = geo.support(
                 body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.bodies.rotation, b), n)
             )

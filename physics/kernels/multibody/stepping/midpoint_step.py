@@ -14,25 +14,31 @@ from physics.kernels.contact_law.target_velocity import (
 from physics.kernels.flight.free_flight import drift_attitude, integrate_flight
 from physics.kernels.forces.held_loads import hold_contact_loads, hold_loads
 from physics.kernels.forces.two_body_spring import hold_linked_loads
-from physics.kernels.forces.world_energy_budget import limit_world_energy_gain, note_stage_energy
+from physics.kernels.forces.world_energy_budget import grant_energy, limit_world_energy_gain, note_stage_energy
 from physics.kernels.half_space.contact_point import ellipsoid_point_and_rate
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
+from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
+from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import (
     add_scaled,
-    contact_velocity,
     pair_slop,
     parted_slack,
     put_vector,
     relative_acceleration_bound,
-    relative_velocity,
     row_matrix,
+    slip_velocity,
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.driven_bodies import (
+    driven_work,
+    moving_body_at,
+    take_later_velocities,
+)
 from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
-from physics.kernels.multibody.data.kinematics import update_body_pose
+from physics.kernels.multibody.data.kinematics import move_driven_bodies, update_body_pose
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
     revert_to_dissipative,
@@ -69,7 +75,8 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 def _centripetal(b, k, first, side, h, many):
     """Acceleration ω x ṙ of body b's point in contact k, world frame [m/s²].
 
-    It is 0 for a sphere, whose contact point stays under its centre. It is also 0 if the body turns by more than
+    It is 0 for a sphere, whose contact point stays under its centre, and that of the ball's centre for a capsule, whose
+    point stays under a point of its axis. It is also 0 if the body turns by more than
     `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end. `first` is the
     column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
@@ -81,7 +88,10 @@ def _centripetal(b, k, first, side, h, many):
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return qt.cross(w, rate)
-    return qt.cross(w, qt.cross(w, row_vector(many.contacts.arm, k, first)))
+    arm = row_vector(many.contacts.arm, k, first)
+    if is_capsule(b, many):
+        arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
+    return qt.cross(w, qt.cross(w, arm))
 
 
 @inlined
@@ -95,7 +105,7 @@ def _coriolis(k, many):
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
         return 0.0
-    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), relative_velocity(k, many.bodies.twist, many)))
+    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), slip_velocity(k, many)))
 
 
 @if_given("many.bodies.fixed", 0.0)
@@ -123,18 +133,19 @@ def set_resting_targets(n, h, many):
     """
     half = 0.5 * h
     for k in range(n):
-        a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+        a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
         slop = pair_slop(a, b, many)
         c = _centripetal(a, k, 0, -1.0, h, many)
         if b >= 0:
             c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
         t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
         t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
+        t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many):
             t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
-        t = clamp_target_to_energy(t, contact_velocity(k, many))
+        t = clamp_target_to_energy(t, qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many)))
         if many.contacts.target[k, 0] == FORETOLD:
             t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
         elif gap > slop:
@@ -217,10 +228,13 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
         update_body_pose(b, switches.flight.offset_frame, many)
         _, q, _, L = read_state(many.bodies.state, b)
         put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], switches.flight.offset_frame))
+    move_driven_bodies(half, switches.flight.offset_frame, many)
     if n == 0:
+        move_driven_bodies(half, switches.flight.offset_frame, many)
         kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
     update_contacts(many)
+    take_later_velocities(n, half, many)
     set_resting_targets(n, h, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
@@ -251,6 +265,13 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
             drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+    move_driven_bodies(half, switches.flight.offset_frame, many)
+
+
+@if_given("many.driven")
+def _grant_driven_work(n, many):
+    """Let the energy budget of the stage allow for the work of driven bodies by the impulses of the n contacts."""
+    grant_energy(driven_work(n, many), many.bodies.body[0])
 
 
 @kernel
@@ -263,4 +284,5 @@ def midpoint_step(n, world, h, switches, sleep, records, many):
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
     note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.body[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)
+    _grant_driven_work(n, many)
     limit_world_energy_gain(h, 0, switches.flight.offset_frame, many.bodies, many.bodies.body[0])

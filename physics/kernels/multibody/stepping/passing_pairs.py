@@ -15,24 +15,26 @@ stands out by less is no obstacle.
 from __future__ import annotations
 
 from physics.compiler.decorators import inlined, kernel, shared_kernel
-from physics.kernels.flight.free_flight import drift_attitude
 from physics.kernels.half_space.contact_point import center_arm
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.quaternion import to_matrix
 from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.contact_set import (
     DEEP_SHARE,
     FEATURES_PER_PAIR,
     PARTED,
     add_contact,
     add_scaled,
+    end_of_pair,
     is_stopping,
     pair_slop,
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.driven_bodies import attitude_after
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
@@ -132,7 +134,7 @@ def _is_stopping(k, h, many):
 def _end_pose(b, h, gyroscopic, offset_frame, many):
     """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
     x, q, v, L = read_state(many.bodies.state, b)
-    R = to_matrix(drift_attitude(q, L, many.bodies.body[b], h, gyroscopic, offset_frame))
+    R = to_matrix(attitude_after(b, q, L, h, gyroscopic, offset_frame, many))
     x = add_scaled(x, h, v)
     if offset_frame is not None:
         x = add_scaled(x, 1.0, center_arm(R, many.bodies.body[b]))
@@ -161,7 +163,10 @@ def _holds_point(b, p, thinner, hulls, many):
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:
             return _hull_holds_point(b, p, thinner, many)
-    if shape == SPHERE:
+    if is_capsule(b, many):
+        y = half_length(b, many)
+        p = (p[0], p[1] - min(max(p[1], -y), y), p[2])
+    if shape == SPHERE or is_capsule(b, many):
         return qt.dot(p, p) < (d[0] - thinner) ** 2
     d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)
     if shape == BLOCK:
@@ -209,25 +214,30 @@ def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
     return n, gap > 0.0
 
 
-@kernel
-def _gap_along(a, b, n, hulls, many):
-    """Gap of bodies a and b along the unit vector n out of b: (gap [m], nearest point of a, nearest point of b).
-
-    The points are in the world frame [m].
-    """
-    x, y = row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0)
-    p = support_point(a, x, row_matrix(many.bodies.rotation, a), (-n[0], -n[1], -n[2]), 0.0, hulls, many)
-    q = support_point(b, y, row_matrix(many.bodies.rotation, b), n, 0.0, hulls, many)
-    return qt.dot(n, subtract(p, q)), p, q
-
-
 @inlined
-def _end_of_pair(k, n, many):
-    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
-    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-    while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
-        k += 1
-    return k
+def _point_along(k, b, first, n, hulls, many):
+    """Point of body b that reaches farthest along the unit vector n, world frame [m].
+
+    Of a capsule it is that of the ball with which it touches in contact k: the farthest end of its axis may be far from
+    the other body, and would turn the capsule. `first` is the column of the body's anchor.
+    """
+    R = row_matrix(many.bodies.rotation, b)
+    if is_capsule(b, many):
+        arm = qt.matvec(R, row_vector(many.contacts.anchor, k, first))
+        return add_scaled(add_scaled(row_vector(many.bodies.state, b, 0), 1.0, arm), many.bodies.body[b].dims[0], n)
+    return support_point(b, row_vector(many.bodies.center, b, 0), R, n, 0.0, hulls, many)
+
+
+@kernel
+def _gap_along(k, n, hulls, many):
+    """Gap of the bodies a and b of contact k along the unit vector n out of b: (gap [m], point of a, point of b).
+
+    The points are the nearest ones, in the world frame [m].
+    """
+    a, b = _bodies_of(k, many)
+    p = _point_along(k, a, 0, (-n[0], -n[1], -n[2]), hulls, many)
+    q = _point_along(k, b, 3, n, hulls, many)
+    return qt.dot(n, subtract(p, q)), p, q
 
 
 @inlined
@@ -275,7 +285,7 @@ def _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many):
         many.contacts.target[k, 0] = 0.0
     k = 0
     while k < n:
-        last = _end_of_pair(k, n, many)
+        last = end_of_pair(k, n, many)
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             mark = _mark_of_pair(found, n, h, gyroscopic, offset_frame, hulls, many)
@@ -299,7 +309,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     m, is_parted = _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted or qt.dot(way, m) > _SAME_DIRECTION:
         return False, to
-    gap, p, q = _gap_along(a, b, m, hulls, many)
+    gap, p, q = _gap_along(k, m, hulls, many)
     if not gap > pair_slop(a, b, many):
         return _depth_after(k, h, many) > DEEP_SHARE * thinner, to
     if _moves_as_foreseen(a, b, gap, n, h, many):
@@ -319,7 +329,7 @@ def redirect_passing_pairs(n, h, gyroscopic, offset_frame, hulls, many):
     _mark_pairs(n, h, gyroscopic, offset_frame, hulls, many)
     k, left = 0, 0
     while k < n:
-        last, is_passing = _end_of_pair(k, n, many), False
+        last, is_passing = end_of_pair(k, n, many), False
         found = _fastest_stopping(k, last, h, many)
         if found >= 0:
             is_passing, left = _redirect_pair(found, n, left, h, gyroscopic, offset_frame, hulls, many)

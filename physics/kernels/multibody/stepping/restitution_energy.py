@@ -7,6 +7,7 @@ from physics.kernels.contact_law.restitution_energy import IMPACT_ENERGY_ROUNDIN
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector
+from physics.kernels.multibody.data.driven_bodies import driven_work
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
@@ -126,29 +127,32 @@ def apply_impact_within_energy(n, world, friction, offset_frame, report, many):
     """Solve and apply an impact of the n contacts, with the largest rebound that creates no energy.
 
     With friction, Newton's law may require more energy than the bodies have. Without friction, a loose solve may create
-    some. `world` is the index of the world; `friction` is None if the scene has no friction.
+    some. `world` is the index of the world; `friction` is None if the scene has no friction. Work of driven bodies is
+    no energy that the impact creates.
     """
     _save_momenta(_PRE_IMPACT, many)
     before = world_kinetic_energy(offset_frame, many)
-    most = before + _ENERGY_TOLERANCES * many.settings[0].tolerance * before
     has_rebound = _has_rebound(n, many)
     solve_and_apply(n, world, friction, report, many)
-    full = world_kinetic_energy(offset_frame, many)
-    if not full > (before + IMPACT_ENERGY_ROUNDING * before if has_rebound else most):
+    work = driven_work(n, many)
+    full, size = world_kinetic_energy(offset_frame, many) - work, before + abs(work)
+    most = before + _ENERGY_TOLERANCES * many.settings[0].tolerance * size
+    if not full > (before + IMPACT_ENERGY_ROUNDING * size if has_rebound else most):
         return
-    plastic = full
+    plastic, least_work = full, work
     if has_rebound:
         _save_momenta(_FULL_REBOUND, many)
         _save_impulses(n, many)
         _set_plastic_targets(n, many)
         _update_twists(offset_frame, many)
         solve_and_apply(n, world, friction, report, many)
-        plastic = world_kinetic_energy(offset_frame, many)
+        least_work = driven_work(n, many)
+        plastic = world_kinetic_energy(offset_frame, many) - least_work
     if plastic > most:
         _apply_frictionless(n, offset_frame, many)
         return
     _blend_momenta(0.5, many)
-    middle = world_kinetic_energy(offset_frame, many)
+    middle = world_kinetic_energy(offset_frame, many) - 0.5 * (work + least_work)
     s = rebound_share(before, plastic, full, middle)
     _blend_momenta(2.0 * s - 1.0, many)  # momenta are at the middle between plastic impact and full rebound
     _blend_impulses(n, s, many)

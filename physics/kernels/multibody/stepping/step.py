@@ -12,6 +12,7 @@ from physics.kernels.contact_law.materials import bind_wall_coefficients
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.data.driven_bodies import bind_motions, write_driven_velocities
 from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_asleep, update_sleep, wake_world
 from physics.kernels.multibody.data.warm_start import clear_warm_start
 from physics.kernels.multibody.stepping.adaptive_substep import step_with_error_control
@@ -77,6 +78,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         bind_wall_coefficients(params, i, many.bodies.body[b])
         write_state(many.bodies.state, b, read_state(state, i))
         many.bodies.touched[b] = 0
+    bind_motions(params, world * bodies, many)
     lost = max(find_overloaded_body(many.bodies.body), find_nonfinite_body(many.bodies.state))
     if lost >= 0:
         report_fault(world, lost, report)
@@ -108,6 +110,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         i = world * bodies + b
         _, q, _, L = read_state(state, i)
         put_vector(state, i, at.ANGVEL, angular_velocity(q, L, many.bodies.body[b], offset_frame))
+    write_driven_velocities(state, world * bodies, many)
 
 
 _advance_worlds = for_each_world(advance_world)

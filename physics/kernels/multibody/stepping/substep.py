@@ -29,6 +29,7 @@ from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
 from physics.kernels.multibody.data.contact_set import smaller_radius
+from physics.kernels.multibody.data.driven_bodies import bind_driven_twists
 from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
@@ -38,9 +39,10 @@ from physics.kernels.multibody.stepping.conservative_advancement import (
     write_spin_bounds,
 )
 from physics.kernels.multibody.stepping.impact import resolve_impacts
-from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads, midpoint_step
+from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads
 from physics.kernels.multibody.stepping.passing_pairs import redirect_passing_pairs
 from physics.kernels.multibody.stepping.position_correction import correct_positions
+from physics.kernels.multibody.stepping.slip_end import step_to_slip_end
 from physics.kernels.state import layout as at
 from physics.kernels.state.groups import flies_exactly
 
@@ -95,6 +97,7 @@ def substep_world(
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
         hold_all_loads(left, switches.flight.gyroscopic, switches.flight.offset_frame, many)
         update_poses_and_twists(switches.flight.offset_frame, many)
+        bind_driven_twists(start + (h - left), left, many)
         is_turning = write_spin_bounds(h, switches.flight.offset_frame, many)
         if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
             clear_spin_bounds(many)
@@ -127,7 +130,7 @@ def substep_world(
             cuts += 1
         if t < left:
             records.report[world, at.SPLITS] += 1.0
-        midpoint_step(n, world, t, switches, sleep, records, many)
+        t = step_to_slip_end(n, world, start + (h - left), t, is_last, switches, sleep, records, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.body[b])

@@ -71,8 +71,9 @@ class Drake:
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
         """Build a scene in Drake, see `contender.Engine.open`."""
         refuse_meetings(scene)
-        if any(body.kind == "hull" for body in scene.bodies):
-            raise Unsupported("hulls are not handed to Drake")
+        for body in scene.bodies:
+            if body.kind in ("hull", "capsule"):
+                raise Unsupported(f"{body.kind}s are not handed to Drake")
         if options.pop("is_fitted", False):
             options["dissipation"] = dissipation(scene)
         return _Run(scene, dt, **options)

@@ -57,8 +57,8 @@ class PyBullet:
         for body in scene.bodies:
             if body.kind == "ellipsoid":
                 raise Unsupported("PyBullet has no ellipsoid")
-            if body.kind == "hull":
-                raise Unsupported("hulls are not handed to PyBullet")
+            if body.kind in ("hull", "capsule"):
+                raise Unsupported(f"{body.kind}s are not handed to PyBullet")
             if (body.inertia - np.diag(np.diag(body.inertia))).any():
                 raise Unsupported("PyBullet takes the moments of inertia along the body's axes only")
         return _Run(scene, dt, **options)
