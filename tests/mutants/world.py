@@ -165,8 +165,8 @@ QUERIES = [
         "rays-missed-block",
         "A ray hits a block that it passes by.",
         "kernels/queries/ray_shapes.py",
-        "    if near > last or last < 0.0:",
-        "    if last < 0.0:",
+        "        last, leave = b, 2\n    if near > last or last < 0.0:",
+        "        last, leave = b, 2\n    if last < 0.0:",
         "test_rays.py",
     ),
     _mutant(

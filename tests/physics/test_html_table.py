@@ -68,7 +68,7 @@ def every_public_object():
     yield from (physics.Gravity(), physics.Contact(0.25), physics.Friction(0.5), physics.RollingFriction(0.125))
     yield from (physics.SpinFriction(0.5), physics.Actuator(lag=0.25), physics.Sleeping(), physics.Drag(0.5))
     yield from (physics.AngularDrag(0.5), physics.Buoyancy(1.5), physics.Magnus(), physics.Wind(gust=2.0))
-    yield from (physics.Spring((0, 9, 0)), physics.Push((1, 2, 3)))
+    yield from (physics.Spring((0, 9, 0)), physics.Push((1, 2, 3)), physics.Motion(spin=(0, 2.5, 0)))
     yield physics.Truth(len, "m", 0.5)
     world = physics.World(scenes.drop())
     world.keep_impacts()
