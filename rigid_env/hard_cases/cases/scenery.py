@@ -112,7 +112,7 @@ def of_last_step(on: Setting, mu: float) -> float:
 
 
 def early(on: Setting, body: physics.Body) -> float:
-    """Largest displacement that one hit adds to the path of a body that flies between walls [m].
+    """Bound the way that a body gains by one hit that is treated too early [m]; it flies between walls.
 
     Time stepping computes the time of a hit at constant speed by one division, so this is 0. The event-driven scheme
     treats contacts that would touch within 1e-10 and ten tolerances of the time R/v as one impact (theory, section 8).
