@@ -40,7 +40,7 @@ BROADPHASE = [
 DATA = [
     _mutant(
         "data-capsule",
-        "The contact point of a capsule is carried along by the body instead of staying below the axis.",
+        "The contact point of a capsule moves to the axis of the capsule.",
         "data/contact_set.py",
         "return add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm",
         "return arm",
@@ -107,7 +107,7 @@ NARROWPHASE = [
     ),
     _mutant(
         "narrowphase-capsule-edge",
-        "A capsule touches an edge only where the edge is nearer than any other point.",
+        "A capsule does not touch the edges that its axis passes.",
         "narrowphase/capsule_hull.py",
         "if far > distance or",
         "if far > 0.9 * distance or",

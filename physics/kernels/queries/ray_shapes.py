@@ -155,7 +155,7 @@ def ray_capsule(o, d, dims):
     for end in range(2):
         first, leave = _stay_in_ball((o[0], o[1] - (2.0 * end - 1.0) * half, o[2]), d, r)
         near, last = min(near, first), max(last, leave)
-    if near > last or last < 0.0:
+    if last < max(near, 0.0):
         return MISS
     t = near if near >= 0.0 else last
     x = plus(o, times(t, d))
