@@ -11,8 +11,26 @@ from pathlib import Path
 import numpy as np
 
 import physics
-from benchmarks.bit_scenes import DT, SCENES
+from benchmarks import bit_scenes
+from benchmarks.bit_scenes import DT
 from physics.compiler.compiler_choice import VARIABLE
+
+
+def workshop() -> physics.Scene:
+    """A belt, a capsule, coefficients of one's own and groups: what no older scene has, in one kernel."""
+    belt = physics.Motion(surface_velocity=(0.5, 0, 0))
+    bodies = [
+        physics.Block((6, 1, 6), fixed=True, pos=(0, -0.5, 0), motion=belt, friction=0.3, group=3),
+        physics.Block((0.5, 0.3, 0.4), 2.0, pos=(0, 0.3, 0), linvel=(0, 0, 0.5), restitution=0.4),
+        physics.Capsule(0.2, 0.6, 1.0, pos=(1, 0.35, 0), quat=(0.8, 0.36, 0.0, 0.48), friction=0.6),
+        physics.Sphere(0.2, 1.0, pos=(0.1, 0.7, 0), group=2, mask=2),
+    ]
+    walls = [physics.HalfSpace((-1, 0, 0), -4.0, friction=0.2, restitution=0.5)]
+    laws = [physics.Gravity(), physics.Contact(0.2), physics.Friction(0.5, rule="minimum", pairs={(0, 1): 0.4})]
+    return physics.Scene(bodies, walls, laws)
+
+
+SCENES = {**bit_scenes.SCENES, "workshop": workshop}
 
 
 def trajectory(scene: str, preset: str, steps: int, threads: int = 1) -> dict:

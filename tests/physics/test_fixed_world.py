@@ -165,6 +165,7 @@ def test_bodies_on_it_sleep_and_wake_apart():
     assert world.state[1].tobytes() == before
 
 
+@pytest.mark.exhaustive
 def test_springs_between_bodies_beside_it():
     """A stiff spring holds two blocks above the table: the fixed body is not part of the springs' problem."""
     spring = physics.Spring(body=0, other=2, stiffness=1e6, damping=100.0, length=1.5)
