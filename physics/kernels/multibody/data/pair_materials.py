@@ -23,7 +23,7 @@ def _find_pair(key, keys):
 
 @kernel
 def _coefficient(key, keys, numbers, rule, one, other):
-    """Look up the coefficient of the pair `key`; without one combine those of its bodies, `one` and `other`, by a rule."""
+    """Find the coefficient of the pair `key`; without one combine those of its bodies, `one` and `other`, by a rule."""
     place = _find_pair(key, keys)
     return numbers[place] if place >= 0 else combine(rule, one, other)
 
