@@ -247,6 +247,8 @@ class Block(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            group: int = GROUP,
+            mask: int = MASK,
             motion: Motion | None = None,
             center: ArrayLike = ...,
         ) -> None: ...
@@ -320,6 +322,8 @@ class Sphere(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            group: int = GROUP,
+            mask: int = MASK,
             motion: Motion | None = None,
         ) -> None: ...
 
@@ -386,6 +390,8 @@ class Ellipsoid(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            group: int = GROUP,
+            mask: int = MASK,
             motion: Motion | None = None,
         ) -> None: ...
 
@@ -463,6 +469,8 @@ class Hull(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            group: int = GROUP,
+            mask: int = MASK,
             motion: Motion | None = None,
         ) -> None: ...
 

@@ -104,7 +104,6 @@ def make_bodies_workspace(
     fixed: np.ndarray | None = None,
     *,
     groups: np.ndarray | None = None,
-    capsules: bool | None = None,
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     motion_columns: int = 0,
     **settings: float,
@@ -138,7 +137,9 @@ def make_bodies_workspace(
     """
     contacts = contact_capacity(bodies, len(walls), polyhedra)
     return BodiesWorkspace(
-        bodies=_make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules),
+        bodies=_make_bodies(
+            bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, settings.pop("capsules", None)
+        ),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
