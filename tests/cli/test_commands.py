@@ -520,8 +520,8 @@ def test_a_demo_without_a_picture_ends_with_the_line_that_brings_it(hidden, word
             {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "creep", marks=pytest.mark.exhaustive,
         ),
         (
-            ["hard-cases", "zeno", "--quick", "--plot", "x.png", "--json", "x.json"],
-            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "zeno",
+            ["hard-cases", "parabola", "--quick", "--plot", "x.png", "--json", "x.json"],
+            {"matplotlib"}, ("matplotlib", "rigid-env[plot]"), "parabola",
         ),
     ],
     ids=["run", "accuracy", "hard-cases"],

@@ -33,7 +33,7 @@ def scene(truth: restick.Truth) -> physics.Scene:
 
 
 @pytest.mark.parametrize(
-    ("dt", "accuracy"), sweep(itertools.product([0.001, 0.01, 0.1], OFF), lambda case: case != (0.001, "reference"))
+    ("dt", "accuracy"), sweep(itertools.product([0.001, 0.01, 0.1], OFF), lambda case: case[0] > 0.001)
 )
 def test_an_ellipsoid_slips_and_sticks_again_when_and_where_it_must(dt, accuracy):
     for k, truth in enumerate(TRUTHS):

@@ -146,6 +146,7 @@ def test_bodies_that_pass_each_other_rest_on_it():
     np.testing.assert_allclose(world.pos[0, 2], (-1, 0.25, 0), atol=1e-5)
 
 
+@pytest.mark.exhaustive
 def test_bodies_on_it_sleep_and_wake_apart():
     """It joins nothing: a block that lands beside a sleeping one does not wake it, one that lands on it does."""
     world = physics.World(scene(cube(0.25, -2.0), cube(0.25, 2.0), laws=[*LAWS, physics.Sleeping()]), dt=0.005)

@@ -9,6 +9,8 @@ import physics
 from physics import Block, Contact, Friction, Gravity, HalfSpace, Scene, Sphere, World
 from physics.io.toml import from_toml, to_toml
 
+pytestmark = pytest.mark.interpreted
+
 DIE = Block((0.2, 0.2, 0.2), 0.1, pos=(0, 0.1, 0), name="die", friction=0.4, restitution=0.2)
 BALL = Sphere(0.1, 0.1, pos=(1, 0.1, 0), name="ball")
 FLOOR = HalfSpace((0, 1, 0), name="floor", friction=0.1)

@@ -70,22 +70,34 @@ def test_an_ellipsoid_rebounds_with_its_share_of_the_speed():
     assert drop.pos[-1, 0, 1] == pytest.approx(0.3 + speed * 0.1 - 0.5 * G * 0.01, abs=1e-8)
 
 
+# The next two scenes have the same kernels: those of blocks, hulls and spheres that touch each other and a floor.
+
+
+def _hull(mass: float, corners, **start) -> physics.Hull:
+    return physics.Hull([(x, y, z) for z in (-1, 1) for x, y in corners], mass=mass, **start)
+
+
 @pytest.mark.interpreted
 def test_spheres_that_meet_a_hull_keep_their_momentum():
-    wedge = physics.Hull([(-1, -1, -1), (1, -1, -1), (0, 1, -1), (-1, -1, 1), (1, -1, 1), (0, 1, 1)], mass=2.0)
-    ball = physics.Sphere(radius=0.5, mass=1.0, pos=(0, 0, 4.0), linvel=(0.1, 0, -6))
-    scene = physics.Scene([wedge, ball], effects=[physics.Contact(restitution=0.5), physics.Friction(0.3)])
-    world = physics.World(scene, dt=0.01, accuracy="fast")
+    wedge = _hull(2.0, [(-1, -1), (1, -1), (0, 1)], pos=(0, 50, 0))
+    ball = physics.Sphere(radius=0.5, mass=1.0, pos=(0, 50, 4.0), linvel=(0.1, 0, -6))
+    block = physics.Block((1, 1, 1), mass=4.0, pos=(0, 20, 0))
+    weightless = [physics.Gravity((0, 0, 0)), physics.Contact(restitution=0.5), physics.Friction(0.3)]
+    world = physics.World(physics.Scene([wedge, ball, block], [FLOOR], weightless), dt=0.01)
     for _ in range(100):
         assert world.step().ok
-    momentum = (world.linvel[0] * np.array([[2.0], [1.0]])).sum(axis=0)
+    momentum = (world.linvel[0] * np.array([[2.0], [1.0], [4.0]])).sum(axis=0)
     np.testing.assert_allclose(momentum, (0.1, 0, -6.0), atol=1e-12)
     assert world.linvel[0, 0, 2] < -1.0  # the wedge was hit
 
 
-def test_a_tower_of_blocks_stands():
-    blocks = [physics.Block((1, 1, 1), mass=2.0**k, pos=(0, k + 0.5, 0)) for k in range(4)]
-    tower = physics.simulate(_floor(blocks, physics.Friction(0.5)), 1.0, accuracy="balanced", sample_dt=0.01)
+@pytest.mark.interpreted
+def test_a_tower_stands():
+    blocks = [physics.Block((2, 1, 2), mass=2.0**k, pos=(0, k + 0.5, 0)) for k in range(2)]
+    hull = _hull(4.0, [(-1, -0.5), (1, -0.5), (1, 0.5), (-1, 0.5)], pos=(0, 2.5, 0))
+    ball = physics.Sphere(radius=0.5, mass=8.0, pos=(0, 3.5, 0))
+    scene = _floor([*blocks, hull, ball], physics.Friction(0.5), restitution=0.0)
+    tower = physics.simulate(scene, 0.3, accuracy="balanced", sample_dt=0.01)
     assert tower.ok
     np.testing.assert_allclose(tower.pos[-1], tower.pos[0], atol=1e-5)
 

@@ -22,11 +22,19 @@ from tests.suite.rates import RATES
 from tests.tiers.sweep import sweep
 
 HASHES = Path(__file__).with_name("hashes.json")
+BALLS = ("BallKick", "BallJuggle")
+"""Environments whose kernels no other test of the default tier needs: 20 s of compiling each."""
+
 STEPS, EARLY, WORLDS = 200, 20, 2  # control steps of a hash, of those that are compared on other processors, and worlds
 
 
 def env_id(name: str) -> str:
     return f"rigid_env/{name}-v0"
+
+
+def quick(name: str) -> bool:
+    """Answer whether the default tier steps an environment."""
+    return name not in BALLS
 
 
 def task_of(name: str) -> type:
@@ -39,7 +47,7 @@ def test_the_registered_limit_is_that_of_the_task(name):
     assert gym.spec(env_id(name)).max_episode_steps == SUITE[name] == task_of(name).max_episode_steps
 
 
-@pytest.mark.parametrize("name", SUITE)
+@pytest.mark.parametrize("name", sweep(SUITE, quick))
 def test_it_passes_the_checks(name, is_exhaustive):
     check_task(gym.spec(env_id(name)).kwargs["task"], contexts=("fork", "spawn") if is_exhaustive else ())
 
@@ -66,7 +74,7 @@ def test_its_documentation_has_every_section(name):
     assert f"{SUITE[name]}" in " ".join(doc.split("## Episode End")[1].split())
 
 
-@pytest.mark.parametrize("name", [name for name in SUITE if env_id(name) in CONTROLLERS])
+@pytest.mark.parametrize("name", sweep([name for name in SUITE if env_id(name) in CONTROLLERS], quick))
 def test_its_controller_solves_it_and_chance_does_not(name):
     pytest.importorskip("stable_baselines3")
     from agents.baselines import baseline_policy
@@ -93,7 +101,7 @@ def digest(name: str, accuracy: str) -> tuple[str, list[float]]:
 
 
 @pytest.mark.parametrize("accuracy", sweep(PRESETS, ["balanced"]))
-@pytest.mark.parametrize("name", SUITE)
+@pytest.mark.parametrize("name", sweep(SUITE, quick))
 def test_its_dynamics_are_those_of_its_version(name, accuracy):
     """An id's dynamics never change: ``python -m tests.suite.test_suite`` writes the hashes of a new id.
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rigid_env import TaskVectorEnv, check_task
+from tests.tiers.sweep import sweep
 
 FOLDER = Path(__file__).parents[2] / "examples"
 CLASSES = {"edge_balance": "EdgeBalance", "two_blocks": "TwoBlocks", "sphere_in_wind": "SphereInWind"}
@@ -31,7 +32,11 @@ def test_they_have_forty_lines_at_most(name):
     assert len((FOLDER / f"{name}.py").read_text(encoding="utf-8").splitlines()) <= 40
 
 
-@pytest.mark.parametrize("name", CLASSES)
+QUICK = ("edge_balance", "two_blocks")
+"""Examples that the default tier steps: kernels for wind take long to compile."""
+
+
+@pytest.mark.parametrize("name", sweep(CLASSES, QUICK))
 def test_they_pass_their_checks_in_workers_too(name, is_exhaustive):
     is_spawned = is_exhaustive or name == "edge_balance"
     check_task(f"{name}:{CLASSES[name]}", contexts=("fork", "spawn") if is_spawned else ("fork",))
@@ -48,7 +53,7 @@ def test_gymnasium_finds_them_and_draws_them(name):
     assert envs.max_episode_steps == 400
 
 
-@pytest.mark.parametrize("name", CLASSES)
+@pytest.mark.parametrize("name", sweep(CLASSES, QUICK))
 def test_stable_baselines3_takes_them(name):
     pytest.importorskip("stable_baselines3")
     from rigid_env import RigidVecEnv
