@@ -1,4 +1,4 @@
-"""Names that a user types in a shell, such as scenes and presets: look them up, and complete them."""
+"""Names and lists that a user types in a shell, such as scenes and presets: look them up, and complete them."""
 
 from __future__ import annotations
 
@@ -41,6 +41,33 @@ def checked_preset(name: str | None) -> str | None:
     if name is not None and name not in PRESETS:
         raise typer.BadParameter(f"{name!r}; allowed are {', '.join(nearest_first(name, PRESETS))}")
     return name
+
+
+def listed(text: str) -> list[str]:
+    """Split a list with commas, such as ``fast,balanced``."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def listed_presets(text: str) -> list[str]:
+    """Split a list of presets with commas, and check their names as `checked_preset` does; an empty list is refused."""
+    found = listed(text) or [text]
+    for name in found:
+        checked_preset(name)
+    return found
+
+
+def listed_numbers(text: str, field: str) -> list[float]:
+    """Split a list of numbers with commas.
+
+    Raises
+    ------
+    ValueError
+        A part of the list is no number; the message calls the list `field`.
+    """
+    try:
+        return [float(part) for part in listed(text)]
+    except ValueError:
+        raise ValueError(f"{field} is {text!r}; allowed are numbers with commas between them") from None
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------

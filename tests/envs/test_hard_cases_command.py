@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 from rigid_env.cli import app
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-from rigid_env.lab.hard_cases import report
 from rigid_env.lab.hard_cases.peers import run_peer
+from rigid_env.lab.hard_cases.report import Report, measure
 from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
 from rigid_env.lab.measure.peers import load
 from rigid_env.launchers.job import Ended
@@ -122,13 +122,15 @@ def test_the_picture_is_drawn(monkeypatch, tmp_path):
 
 def test_other_engines_stand_beside_ours(monkeypatch):
     monkeypatch.setattr(registry, "CASES", (Case(1, "case-1", "a case", "to hold", holds, peers=True),))
-    plan = report.make_plan(registry.find(), "balanced,precise", 0.01, "", True, True)
-    ours = [run_case(plan.cases[0], on) for on in plan.settings]
-    theirs = Outcome(plan.cases[0], "other", "default", 0.01, Status.FAILS, tuple(fails(plan.settings[0])), "", 1.0)
-    found = report.Report(plan, (*ours, theirs), True)
+    found = Report(registry.find(), ("balanced", "precise"))
+    (case,) = found.cases
+    ours = [run_case(case, on) for on in found.settings]
+    theirs = Outcome(case, "other", "default", 0.01, Status.FAILS, tuple(fails(found.settings[0])))
+    found.outcomes = [*ours, theirs]
     assert found.beside == [ours[0], theirs]
     assert not found.has_failed
-    assert report.Report(plan, tuple(ours), True).beside == []
+    found.outcomes = ours
+    assert found.beside == []
 
 
 def test_another_engine_runs_a_case_at_the_first_setting_that_holds():
@@ -169,14 +171,14 @@ def test_cases_are_printed_as_lines_for_a_shell(tmp_path):
 
 
 def test_a_run_that_is_lost_fails_and_says_why(monkeypatch, tmp_path):
-    (case,) = replace_cases(monkeypatch, holds)
-    plan = report.make_plan((case,), "balanced", 0.01, "", True, False)
+    report = Report(replace_cases(monkeypatch, holds))
 
     class Losing(Place):
         def run(self, jobs):
             return (Ended(job.name, None, "its process ended") for job in jobs)
 
-    (outcome,) = report.run_and_show(Console(quiet=True), plan, place=Losing("local", tmp_path)).outcomes
+    measure(report, Console(quiet=True), Losing("local", tmp_path))
+    (outcome,) = report.outcomes
     assert outcome.status is Status.FAILS
     assert outcome.reason == "its process ended"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
 from enum import Enum
@@ -10,6 +9,7 @@ from enum import Enum
 import numpy as np
 
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
+from rigid_env.lab.measure.peers import Unsupported
 
 OURS = "rigid-env"
 
@@ -47,28 +47,26 @@ class Outcome:
     accuracy: str
     dt: float
     status: Status
-    checks: tuple[Check, ...]
-    reason: str
-    seconds: float
+    checks: tuple[Check, ...] = ()
+    reason: str = ""
+    seconds: float = 0.0
 
     @property
     def tightest(self) -> Check | None:
         """Check with the smallest margin, the first among equals; None if there are no checks."""
         return min(self.checks, key=lambda check: check.margin, default=None)
 
+    @property
+    def came_out(self) -> str:
+        """Text of the tightest check. Without checks: the reason for having none."""
+        return str(self.tightest) if self.checks else self.reason
+
     def to_dict(self) -> dict:
-        """Outcome as a dict for JSON; numbers that are not finite become null."""
-        return {
-            "number": self.case.number, "name": self.case.name, "engine": self.engine, "accuracy": self.accuracy,
-            "dt": self.dt, "status": self.status.value, "reason": self.reason, "seconds": self.seconds,
-            "checks": [_check_to_dict(check) for check in self.checks],
-        }  # fmt: skip
-
-
-def _check_to_dict(check: Check) -> dict:
-    numbers = {name: getattr(check, name) for name in ("value", "limit", "expected", "margin")}
-    finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
-    return {"what": check.what, "kind": check.kind, "unit": check.unit, "passes": check.passes, **finite}
+        """Outcome as a dict for JSON, with the number and the name of the case."""
+        checks = [{**vars(check), "passes": check.passes, "margin": check.margin} for check in self.checks]
+        rest = {**vars(self), "status": self.status.value, "checks": checks}
+        case = rest.pop("case")
+        return {"number": case.number, "name": case.name, **rest}
 
 
 def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | None = None) -> Outcome:
@@ -87,7 +85,7 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
             checks = tuple(case.run(setting))
         status = Status.HOLDS if checks and all(check.passes for check in checks) else Status.FAILS
         reason = "" if checks else "no check was made"
-    except UnsupportedError as error:
+    except (UnsupportedError, Unsupported) as error:
         status, reason = Status.UNSUPPORTED, str(error)
     except Exception as error:  # an error in one case must not end the run of the others
         status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
