@@ -198,6 +198,7 @@ def hard_cases(
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
+        from physics import validation
         from rigid_env.hard_cases import registry
         from rigid_env.lab.hard_cases.picture import write_picture
         from rigid_env.lab.hard_cases.report import Report, measure
@@ -205,6 +206,7 @@ def hard_cases(
 
         console = make_console()
         plot, lacking = drawable(plot, console)
+        validation.positive(dt, (), "dt")
         presets, further = names.listed_presets(accuracy), names.listed_numbers(steps, "steps")
         report = Report(registry.find(cases or ()), presets, dt, further, not quick)
         place = make_place(launcher, jobs, address, json)

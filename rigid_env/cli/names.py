@@ -57,17 +57,20 @@ def listed_presets(text: str) -> list[str]:
 
 
 def listed_numbers(text: str, field: str) -> list[float]:
-    """Split a list of numbers with commas.
+    """Split a list of positive numbers with commas.
 
     Raises
     ------
     ValueError
-        A part of the list is no number; the message calls the list `field`.
+        A part of the list is no positive number; the message calls the list `field`.
     """
+    from physics import validation
+
     try:
-        return [float(part) for part in listed(text)]
+        found = [float(part) for part in listed(text)]
     except ValueError:
         raise ValueError(f"{field} is {text!r}; allowed are numbers with commas between them") from None
+    return validation.positive(found, (len(found),), field).tolist()
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------

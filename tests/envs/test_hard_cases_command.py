@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 from rigid_env.cli import app
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-from rigid_env.lab.hard_cases.peers import run_peer
 from rigid_env.lab.hard_cases.report import Report, measure
-from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
+from rigid_env.lab.hard_cases.run import Outcome, Status, run_case, run_peer
 from rigid_env.lab.measure.peers import load
 from rigid_env.launchers.job import Ended
 from rigid_env.launchers.place import Place

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -10,10 +10,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from physics import validation
 from rigid_env.hard_cases.case import Case, Setting
-from rigid_env.lab.hard_cases.peers import run_peer
-from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case
+from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case, run_peer
 from rigid_env.lab.measure.accuracy import load_peers
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.peers import ENGINES, Engine
@@ -40,11 +38,6 @@ class Report:
         Outcomes of our engine, then those of other engines.
     is_complete : bool
         False until all cases have run.
-
-    Raises
-    ------
-    ValueError
-        A step that is not a positive number.
     """
 
     cases: Sequence[Case]
@@ -54,10 +47,6 @@ class Report:
     is_thorough: bool = True
     outcomes: list[Outcome] = field(default_factory=list)
     is_complete: bool = False
-
-    def __post_init__(self):
-        validation.positive(self.dt, (), "dt")
-        validation.positive(self.steps, (len(self.steps),), "steps")
 
     @property
     def settings(self) -> list[Setting]:
@@ -120,7 +109,7 @@ def measure(report: Report, console: Console, place: Place, has_peers: bool = Fa
     engines, missing = load_peers(tuple(ENGINES) if has_peers else ())
     for message in missing:
         console.print(f"skipped: {message}", soft_wrap=True)
-    runs = _our_runs(report, place.folder) + _peer_runs(report, engines.values())
+    runs = list(_runs(report, engines.values(), place.folder))
     lost = {job.name: outcome for job, outcome in runs}
     found: dict[str, Outcome | None] = dict.fromkeys(lost)
     report.is_complete = place.is_printed
@@ -129,39 +118,24 @@ def measure(report: Report, console: Console, place: Place, has_peers: bool = Fa
             found[name] = outcome or replace(lost[name], reason=error)
             report.outcomes = [one for one in found.values() if one]
             report.is_complete = all(found.values())
-            _keep(report, keep)
+            write_json(keep, report.to_dict())
     except KeyboardInterrupt:
-        _keep(report, keep)
+        write_json(keep, report.to_dict())
 
 
-def _our_runs(report: Report, folder: Path) -> list[tuple[Job, Outcome]]:
-    """List runs in our engine as jobs, each with its outcome in case that its process is lost."""
-    runs = []
-    for case, on in product(report.cases, report.settings):
-        path = folder / f"{case.number}-{on.accuracy}-{on.dt}.json"
-        options = {"accuracy": on.accuracy, "dt": on.dt, "quick": not on.is_thorough, "json": path}
-        line = shell_line("rigid-env", "hard-cases", case.number, **options)
-        name = f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms"
-        lost = Outcome(case, OURS, on.accuracy, on.dt, Status.FAILS)
-        runs.append((Job(name, partial(run_case, case, on), line), lost))
-    return runs
+def _runs(report: Report, engines: Collection[Engine], folder: Path) -> Iterator[tuple[Job, Outcome]]:
+    """Yield all runs as jobs, ours and then other engines' of cases that check only the motion.
 
-
-def _peer_runs(report: Report, engines: Iterable[Engine]) -> list[tuple[Job, Outcome]]:
-    """List runs in other engines, as `_our_runs` does, of the cases that check only the motion.
-
-    They are the shorter runs, because each case is tried at all of an engine's settings.
+    Beside each job stands its outcome in case that its process is lost. Other engines make the shorter runs, because
+    each case is tried at all of an engine's settings.
     """
+    for case, on in product(report.cases, report.settings):
+        name = f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms"
+        options = {"accuracy": on.accuracy, "dt": on.dt, "quick": not on.is_thorough}
+        path = folder / f"{case.number}-{on.accuracy}-{on.dt}.json"
+        line = shell_line("rigid-env", "hard-cases", case.number, **options, json=path)
+        yield Job(name, partial(run_case, case, on), line), Outcome(case, OURS, on.accuracy, on.dt)
     short = Setting(dt=report.dt, is_thorough=False)
-    return [
-        (
-            Job(f"{case.number} {case.name}, {engine.name}", partial(run_peer, case, engine, short), ""),
-            Outcome(case, engine.name, "default", report.dt, Status.FAILS),
-        )
-        for case, engine in product([case for case in report.cases if case.peers], engines)
-    ]
-
-
-def _keep(report: Report, path: Path | None) -> None:
-    if path is not None:
-        write_json(path, report.to_dict())
+    for case, engine in product([case for case in report.cases if case.peers], engines):
+        job = Job(f"{case.number} {case.name}, {engine.name}", partial(run_peer, case, engine, short), "")
+        yield job, Outcome(case, engine.name, "default", short.dt)

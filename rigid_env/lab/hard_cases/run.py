@@ -1,15 +1,18 @@
-"""Run one hard case at one setting; an exception in it becomes an outcome, too."""
+"""Run one hard case at one setting, in our engine or in another one."""
 
 from __future__ import annotations
 
+import itertools
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
+import physics
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-from rigid_env.lab.measure.peers import Unsupported
+from rigid_env.lab.measure.peers import Engine, Unsupported
 
 OURS = "rigid-env"
 
@@ -46,7 +49,7 @@ class Outcome:
     engine: str
     accuracy: str
     dt: float
-    status: Status
+    status: Status = Status.FAILS
     checks: tuple[Check, ...] = ()
     reason: str = ""
     seconds: float = 0.0
@@ -69,16 +72,8 @@ class Outcome:
         return {"number": case.number, "name": case.name, **rest}
 
 
-def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | None = None) -> Outcome:
-    """Run one case at one setting.
-
-    Parameters
-    ----------
-    case : Case
-    setting : Setting
-    engine, accuracy : str
-        Names for the outcome, as in `Outcome`; without `accuracy` the setting's preset.
-    """
+def run_case(case: Case, setting: Setting) -> Outcome:
+    """Run one case at one setting; an exception in it becomes an outcome, too."""
     start, checks = time.perf_counter(), ()
     try:
         with np.errstate(all="ignore"):  # the checks report numbers that are not finite
@@ -90,4 +85,49 @@ def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | N
     except Exception as error:  # an error in one case must not end the run of the others
         status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
     seconds = time.perf_counter() - start
-    return Outcome(case, engine, accuracy or str(setting.accuracy), setting.dt, status, checks, reason, seconds)
+    return Outcome(case, OURS, str(setting.accuracy), setting.dt, status, checks, reason, seconds)
+
+
+class PeerWorld:
+    """World of another engine for a hard case: only state, `time` and `step` of a `physics.World` of one world."""
+
+    def __init__(self, engine: Engine, scene: physics.Scene, dt: float, options: Mapping):
+        self._run = engine.open(scene, dt, **options)
+        self._run.restart()
+        self.dt, self.time = dt, 0.0
+        self._look()
+
+    def _look(self) -> None:
+        self.pos, self.quat, self.linvel, self.angvel = (np.asarray(part)[None] for part in self._run.state())
+
+    def step(self, wrench=None, steps: int = 1) -> None:
+        """Advance by `steps` steps; this interface cannot pass a wrench to the engine."""
+        if wrench is not None:
+            raise Unsupported("a wrench is not handed to this engine")
+        self._run.advance(steps)
+        self.time += steps * self.dt
+        self._look()
+
+
+def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
+    """Run a case in another engine at the engine's settings, one after the other, until it holds or is not supported.
+
+    Returns the outcome that holds; if there is none, the outcome at the first setting, the engine's defaults. Its
+    accuracy is the name of the setting in the first world that the case makes.
+    """
+    outcomes, most = [], 1  # most: largest number of settings that a world of the case has
+    for index in itertools.count():
+        names = []  # of the settings of the case's worlds
+
+        def make(scene: physics.Scene, dt: float, index=index, names=names) -> PeerWorld:
+            nonlocal most
+            known = engine.settings(scene)
+            most = max(most, len(known))
+            names.append(list(known)[min(index, len(known) - 1)])
+            return PeerWorld(engine, scene, dt, known[names[-1]])
+
+        outcome = run_case(case, replace(setting, maker=make))
+        outcomes.append(replace(outcome, engine=engine.name, accuracy=names[0] if names else "default"))
+        if outcome.status is not Status.FAILS or len(outcomes) == most:
+            break
+    return outcomes[-1] if outcome.status is Status.HOLDS else outcomes[0]

@@ -79,11 +79,13 @@ def _git(folder: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def write_json(path: str | Path, content: dict) -> None:
+def write_json(path: str | Path | None, content: dict) -> None:
     """Write a result as JSON, with a description of the machine under ``machine``; makes missing folders.
 
-    Numbers that are not finite become null, since JSON has none.
+    Numbers that are not finite become null, since JSON has none. Without a path nothing is written.
     """
+    if path is None:
+        return
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**_finite(content), "machine": describe()}, indent=2, allow_nan=False)
