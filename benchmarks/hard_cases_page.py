@@ -17,11 +17,12 @@ from typing import Annotated
 import typer
 
 from benchmarks import machine
+from physics.work_precision.contender import OURS
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Check
 from rigid_env.lab.hard_cases import show
 from rigid_env.lab.hard_cases.report import Report
-from rigid_env.lab.hard_cases.run import OURS, Outcome, Status
+from rigid_env.lab.hard_cases.run import Outcome, Status
 from rigid_env.launchers.job import shell_line
 
 INTRO = """# Hard cases

@@ -200,9 +200,8 @@ def hard_cases(
     with told_errors():
         from physics import validation
         from rigid_env.hard_cases import registry
-        from rigid_env.lab.hard_cases.picture import write_picture
         from rigid_env.lab.hard_cases.report import Report, measure
-        from rigid_env.lab.hard_cases.show import show
+        from rigid_env.lab.hard_cases.show import show, write_picture
 
         console = make_console()
         plot, lacking = drawable(plot, console)
@@ -210,6 +209,9 @@ def hard_cases(
         presets, further = names.listed_presets(accuracy), names.listed_numbers(steps, "steps")
         report = Report(registry.find(cases or ()), presets, dt, further, not quick)
         place = make_place(launcher, jobs, address, json)
+        if peers and not place.is_here:
+            told = "peers is True with a launcher; allowed is one of the two"
+            raise ValueError(f"{told}: other engines run in this process")
         make_parents(json, plot)
         measure(report, console, place, peers, json)
         show(report, console)

@@ -7,12 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 import physics
 from physics.accuracy import resolve
 from physics.annotations import Preset
-from physics.plan.plan import make_plan
 
 
 class UnsupportedError(Exception):
@@ -125,7 +122,7 @@ class Setting:
             return self.maker(scene, self.dt)
         accuracy = resolve(self.accuracy)  # an unknown preset is an error, and no reason for "not supported"
         try:
-            make_plan(scene, accuracy)
+            physics.make_plan(scene, accuracy)
         except ValueError as error:
             raise UnsupportedError(str(error)) from error
         return physics.World(scene, worlds=worlds, dt=self.dt, accuracy=self.accuracy)
@@ -156,7 +153,7 @@ class Setting:
 
     def steps(self, duration: float) -> int:
         """Smallest number of steps that take at least `duration` [s], up to rounding."""
-        return max(1, math.ceil(duration / self.dt * (1 - 4 * np.finfo(float).eps)))
+        return max(1, math.ceil(duration / self.dt * (1 - 4 * math.ulp(1.0))))
 
     def pick(self, thorough, quick):
         """Return `thorough` in a thorough run, else `quick`."""

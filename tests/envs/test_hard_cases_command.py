@@ -123,8 +123,8 @@ def test_other_engines_stand_beside_ours(monkeypatch):
     monkeypatch.setattr(registry, "CASES", (Case(1, "case-1", "a case", "to hold", holds, peers=True),))
     found = Report(registry.find(), ("balanced", "precise"))
     (case,) = found.cases
-    ours = [run_case(case, on) for on in found.settings]
-    theirs = Outcome(case, "other", "default", 0.01, Status.FAILS, tuple(fails(found.settings[0])))
+    ours = [run_case(case, Setting(name)) for name in found.accuracies]
+    theirs = Outcome(case, "other", "default", 0.01, Status.FAILS, tuple(fails(Setting())))
     found.outcomes = [*ours, theirs]
     assert found.beside == [ours[0], theirs]
     assert not found.has_failed

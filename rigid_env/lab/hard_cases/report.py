@@ -10,8 +10,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from physics.work_precision.contender import OURS
 from rigid_env.hard_cases.case import Case, Setting
-from rigid_env.lab.hard_cases.run import OURS, Outcome, Status, run_case, run_peer
+from rigid_env.lab.hard_cases.run import Outcome, Status, run_case, run_peer
 from rigid_env.lab.measure.accuracy import load_peers
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.peers import ENGINES, Engine
@@ -49,12 +50,6 @@ class Report:
     is_complete: bool = False
 
     @property
-    def settings(self) -> list[Setting]:
-        """Settings for our engine: every accuracy at every step, `dt` among them."""
-        steps = sorted({self.dt, *self.steps})
-        return [Setting(name, dt, self.is_thorough) for name in self.accuracies for dt in steps]
-
-    @property
     def ours(self) -> list[Outcome]:
         """Outcomes of our engine."""
         return [one for one in self.outcomes if one.engine == OURS]
@@ -87,28 +82,11 @@ class Report:
 
 
 def measure(report: Report, console: Console, place: Place, has_peers: bool = False, keep: Path | None = None) -> None:
-    """Run all cases of a report at a place, and keep the outcomes in it. Ctrl-C ends the runs.
+    """Run all cases of a report at a place, in other engines, too, if `has_peers`, and keep the outcomes in it.
 
-    Parameters
-    ----------
-    report : Report
-    console : Console
-    place : Place
-    has_peers : bool
-        Whether other engines run the cases, too.
-    keep : Path, optional
-        File that is updated with the report after each run.
-
-    Raises
-    ------
-    ValueError
-        Other engines are requested at another place than this process.
+    The file `keep` is updated after each run. Ctrl-C ends the runs; what was done by then is kept.
     """
-    if has_peers and not place.is_here:
-        raise ValueError("peers is True with a launcher; allowed is one of the two: other engines run in this process")
-    engines, missing = load_peers(tuple(ENGINES) if has_peers else ())
-    for message in missing:
-        console.print(f"skipped: {message}", soft_wrap=True)
+    engines = load_peers(tuple(ENGINES) if has_peers else (), partial(console.print, soft_wrap=True))
     runs = list(_runs(report, engines.values(), place.folder))
     lost = {job.name: outcome for job, outcome in runs}
     found: dict[str, Outcome | None] = dict.fromkeys(lost)
@@ -129,7 +107,9 @@ def _runs(report: Report, engines: Collection[Engine], folder: Path) -> Iterator
     Beside each job stands its outcome in case that its process is lost. Other engines make the shorter runs, because
     each case is tried at all of an engine's settings.
     """
-    for case, on in product(report.cases, report.settings):
+    steps = sorted({report.dt, *report.steps})
+    settings = [Setting(name, dt, report.is_thorough) for name in report.accuracies for dt in steps]
+    for case, on in product(report.cases, settings):
         name = f"{case.number} {case.name}, {on.accuracy}, {1e3 * on.dt:g} ms"
         options = {"accuracy": on.accuracy, "dt": on.dt, "quick": not on.is_thorough}
         path = folder / f"{case.number}-{on.accuracy}-{on.dt}.json"

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
 import physics
+from physics.work_precision.contender import OURS
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
 from rigid_env.lab.measure.peers import Engine, Unsupported
-
-OURS = "rigid-env"
 
 
 class Status(Enum):
@@ -84,14 +82,13 @@ def run_case(case: Case, setting: Setting) -> Outcome:
         status, reason = Status.UNSUPPORTED, str(error)
     except Exception as error:  # an error in one case must not end the run of the others
         status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
-    seconds = time.perf_counter() - start
-    return Outcome(case, OURS, str(setting.accuracy), setting.dt, status, checks, reason, seconds)
+    return Outcome(case, OURS, str(setting.accuracy), setting.dt, status, checks, reason, time.perf_counter() - start)
 
 
 class PeerWorld:
     """World of another engine for a hard case: only state, `time` and `step` of a `physics.World` of one world."""
 
-    def __init__(self, engine: Engine, scene: physics.Scene, dt: float, options: Mapping):
+    def __init__(self, engine: Engine, scene: physics.Scene, dt: float, **options):
         self._run = engine.open(scene, dt, **options)
         self._run.restart()
         self.dt, self.time = dt, 0.0
@@ -115,7 +112,7 @@ def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
     Returns the outcome that holds; if there is none, the outcome at the first setting, the engine's defaults. Its
     accuracy is the name of the setting in the first world that the case makes.
     """
-    outcomes, most = [], 1  # most: largest number of settings that a world of the case has
+    first, most = None, 1  # most: largest number of settings that a world of the case has
     for index in itertools.count():
         names = []  # of the settings of the case's worlds
 
@@ -124,10 +121,10 @@ def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
             known = engine.settings(scene)
             most = max(most, len(known))
             names.append(list(known)[min(index, len(known) - 1)])
-            return PeerWorld(engine, scene, dt, known[names[-1]])
+            return PeerWorld(engine, scene, dt, **known[names[-1]])
 
         outcome = run_case(case, replace(setting, maker=make))
-        outcomes.append(replace(outcome, engine=engine.name, accuracy=names[0] if names else "default"))
-        if outcome.status is not Status.FAILS or len(outcomes) == most:
-            break
-    return outcomes[-1] if outcome.status is Status.HOLDS else outcomes[0]
+        outcome = replace(outcome, engine=engine.name, accuracy=names[0] if names else "default")
+        first = first or outcome
+        if outcome.status is not Status.FAILS or index + 1 >= most:
+            return outcome if outcome.status is Status.HOLDS else first

@@ -35,7 +35,7 @@ def measure(scene: str, engines: tuple[str, ...], ladder: Ladder, duration: floa
     KeyboardInterrupt
         Interrupted before any setting was measured.
     """
-    loaded, _ = accuracy.load_peers(engines)
+    loaded = accuracy.load_peers(engines)
     for found in accuracy.run(accuracy.make_jobs([scene], loaded, ladder, duration), ladder):
         return found.frontier
     raise KeyboardInterrupt

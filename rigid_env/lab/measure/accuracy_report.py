@@ -92,9 +92,7 @@ def measure_and_show(
     if shown.below is not None:
         validation.positive(shown.below, (), "below")
     ladder = ladder or Ladder()
-    engines, missing = accuracy.load_peers(peers)
-    for message in missing:
-        console.print(f"skipped: {message}")
+    engines = accuracy.load_peers(peers, console.print)
     if engines:
         console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
     jobs = accuracy.make_jobs(scenes, engines, ladder, duration)

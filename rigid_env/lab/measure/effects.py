@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import physics
-from physics import scenes
-from physics.keywords import nearest_first
+from physics import scenes, validation
 from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
 
 STEP = 0.005  # [s]
@@ -132,8 +131,7 @@ def chosen(names: Sequence[str]) -> list[str]:
         A name that is not in `CASES`.
     """
     for name in names:
-        if name not in CASES:
-            raise ValueError(f"effect is {name!r}; allowed are {', '.join(nearest_first(name, CASES))}")
+        validation.one_of(name, CASES, "effect")
     return list(names or CASES)
 
 
