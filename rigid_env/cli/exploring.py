@@ -226,6 +226,8 @@ def warmup(
 ) -> None:
     """Compile kernels ahead; what is compiled already takes no time."""
     with told_errors():
+        from dataclasses import asdict
+
         from rigid_env.lab.warmup import jobs, jobs_of, warm
 
         make_parents(json)
@@ -241,4 +243,4 @@ def warmup(
                 done.append(result)
         total = sum(result.seconds for result in done)
         console.print(f"{total:7.2f} s  together")
-        write(json, {"plans": [result.to_dict() for result in done], "seconds": total}, console)
+        write(json, {"plans": [asdict(result) for result in done], "seconds": total}, console)

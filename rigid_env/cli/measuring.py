@@ -206,7 +206,7 @@ def hard_cases(
         console = make_console()
         plot, lacking = drawable(plot, console)
         validation.positive(dt, (), "dt")
-        presets, further = names.listed_presets(accuracy), names.listed_numbers(steps, "steps")
+        presets, further = names.listed_presets(accuracy), names.listed_steps(steps)
         report = Report(registry.find(cases or ()), presets, dt, further, not quick)
         place = make_place(launcher, jobs, address, json)
         if peers and not place.is_here:

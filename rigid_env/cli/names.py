@@ -49,28 +49,33 @@ def listed(text: str) -> list[str]:
 
 
 def listed_presets(text: str) -> list[str]:
-    """Split a list of presets with commas, and check their names as `checked_preset` does; an empty list is refused."""
-    found = listed(text) or [text]
-    for name in found:
-        checked_preset(name)
-    return found
-
-
-def listed_numbers(text: str, field: str) -> list[float]:
-    """Split a list of positive numbers with commas.
+    """Split a list of presets with commas.
 
     Raises
     ------
     ValueError
-        A part of the list is no positive number; the message calls the list `field`.
+        A name is no preset, or there is none.
+    """
+    from physics import PRESETS, validation
+
+    return [validation.one_of(name, PRESETS, "accuracy") for name in listed(text) or [text]]
+
+
+def listed_steps(text: str) -> list[float]:
+    """Split a list of steps [s] with commas.
+
+    Raises
+    ------
+    ValueError
+        A part of the list is no positive number.
     """
     from physics import validation
 
     try:
         found = [float(part) for part in listed(text)]
     except ValueError:
-        raise ValueError(f"{field} is {text!r}; allowed are numbers with commas between them") from None
-    return validation.positive(found, (len(found),), field).tolist()
+        raise ValueError(f"steps is {text!r}; allowed are numbers [s] with commas between them") from None
+    return [float(validation.positive(step, (), "steps")) for step in found]
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------
