@@ -30,7 +30,7 @@ from rigid_env.lab.measure.machine import write_json
 from rigid_env.launchers import LAUNCHERS
 from rigid_env.launchers.job import Job
 from rigid_env.launchers.place import Place
-from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
+from rigid_env.terminal import Table, make_console, number_columns, run_program
 
 RESULTS = Path("benchmarks/results/suite")
 JUDGED_EPISODES = 200  # at each preset
@@ -110,17 +110,14 @@ def write_results(trials: Sequence[Trial], out: Path, results: Path, place: Plac
     jobs = [Job(name, partial(judge_trial, trial, str(out)), "") for name, trial in by_name.items()]
     jobs += [Job(name, partial(measure_floors, env), "") for name, env in floors.items()]
     errors = []
-    with progress_bar(console) as bar:
-        task = bar.add_task("judging", total=len(jobs))
-        for name, found, error, _ in place.run(jobs) if jobs else ():
-            bar.update(task, advance=1, description=name)
-            if found is None:
-                errors.append(f"{name}: {error}")
-            elif name in floors:
-                write_json(floors_file(results, floors[name]), {"env": floors[name], "floors": found})
-            else:
-                trial = by_name[name]
-                write_trial(results, trial, out, done[trial.name], found)
+    for name, found, error, _ in place.watch(jobs, console) if jobs else ():
+        if found is None:
+            errors.append(f"{name}: {error}")
+        elif name in floors:
+            write_json(floors_file(results, floors[name]), {"env": floors[name], "floors": found})
+        else:
+            trial = by_name[name]
+            write_trial(results, trial, out, done[trial.name], found)
     return errors
 
 

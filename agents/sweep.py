@@ -23,7 +23,7 @@ from agents.evaluate import write_json
 from agents.run import read_result
 from agents.trials import Trial, make_trials, parse_grid, parse_seeds
 from agents.worker import make_job
-from rigid_env.cli.names import checked_preset
+from rigid_env.cli.names import listed_presets
 from rigid_env.launchers import LAUNCHERS, load
 from rigid_env.launchers.job import Ended, Launch
 from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
@@ -158,7 +158,7 @@ def main(
     try:
         grid = parse_grid(settings or [])
         if accuracy is not None:
-            grid["accuracy"] = [checked_preset(name.strip()) for name in accuracy.split(",")]
+            grid["accuracy"] = listed_presets(accuracy)
         trials = make_trials(env, parse_seeds(seeds), grid, algo, hyperparameters)
         launch = load(launcher)
         check_scheduler(scheduler, launcher)

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from benchmarks import machine
+from rigid_env.cli.names import listed
 from rigid_env.lab.measure.accuracy import QUICK, Ladder, names
 from rigid_env.lab.measure.accuracy_report import measure_and_show, write_result
 from rigid_env.terminal import make_console
@@ -28,7 +29,7 @@ def main(
     path = json.resolve() if json else None
     console.print(machine.headline())
     try:
-        report = measure_and_show(console, scene or (), peers, ladder)
+        report = measure_and_show(console, scene or (), listed(peers), ladder)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     if path is None and not quick and report.is_complete:

@@ -17,11 +17,13 @@ from typing import Annotated
 import typer
 
 from benchmarks import machine
+from physics.work_precision.contender import OURS
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Check
 from rigid_env.lab.hard_cases import show
-from rigid_env.lab.hard_cases.report import Plan, Report
-from rigid_env.lab.hard_cases.run import OURS, Outcome, Status
+from rigid_env.lab.hard_cases.report import Report
+from rigid_env.lab.hard_cases.run import Outcome, Status
+from rigid_env.launchers.job import shell_line
 
 INTRO = """# Hard cases
 
@@ -64,11 +66,7 @@ def read_report(content: dict) -> Report:
                 tuple(map(_check, row["checks"])), row["reason"], row["seconds"])
         for row in content["rows"]
     )  # fmt: skip
-    of, has_peers = content["settings"], any(one.engine != OURS for one in outcomes)
-    plan = Plan(
-        tuple(cases.values()), tuple(of["accuracies"]), of["dt"], tuple(of["steps"]), of["is_thorough"], has_peers
-    )
-    return Report(plan, outcomes, content["is_complete"])
+    return Report(tuple(cases.values()), **content["settings"], outcomes=outcomes, is_complete=content["is_complete"])
 
 
 def _check(row: dict) -> Check:
@@ -77,14 +75,15 @@ def _check(row: dict) -> Check:
     return Check(row["what"], value, limit, row["unit"], row["kind"], expected)
 
 
-def command(plan: Plan, result: Path) -> str:
+def command(report: Report, result: Path) -> str:
     """Line for a shell that makes a result."""
-    words = ["rigid-env hard-cases", *_spans([case.number for case in plan.cases])]
-    words += ["--accuracy", ",".join(plan.accuracies)]
-    words += [] if plan.dt == 0.01 else ["--dt", f"{plan.dt:g}"]
-    words += ["--steps", ",".join(f"{step:g}" for step in plan.steps)] if plan.steps else []
-    words += ["--peers"] * plan.has_peers + ["--quick"] * (not plan.is_thorough)
-    return " ".join([*words, "--json", str(result)])
+    options = {
+        "accuracy": ",".join(report.accuracies), "dt": None if report.dt == 0.01 else f"{report.dt:g}",
+        "steps": ",".join(f"{step:g}" for step in report.steps) or None, "peers": bool(report.beside),
+        "quick": not report.is_thorough,
+    }  # fmt: skip
+    spans = _spans([case.number for case in report.cases])
+    return " ".join(["rigid-env hard-cases", *spans, shell_line(**options, json=result)])
 
 
 def _spans(numbers: list[int]) -> list[str]:
@@ -97,19 +96,19 @@ def write_page(page: Path, result: Path, picture: Path | None = None) -> None:
     """Write the page of a result; `picture` is the one that the same run drew."""
     content = json.loads(result.read_text(encoding="utf-8"))
     report, of = read_report(content), content["machine"]
-    lines = f"{command(report.plan, result)}{f' --plot {picture}' if picture else ''}"
+    lines = f"{command(report, result)}{f' --plot {picture}' if picture else ''}"
     lines += f"\npython -m benchmarks.hard_cases_page {result} {page}{f' --picture {picture}' if picture else ''}"
     parts = [INTRO, f"This page was written by\n\n```sh\n{lines}\n```\n", f"at {machine.headline(of)}."]
-    for accuracy in report.plan.accuracies:
+    for accuracy in report.accuracies:
         if found := [one for one in report.details if one.accuracy == accuracy]:
-            parts += [f"## `{accuracy}` at {1e3 * report.plan.dt:g} ms", f"{show.summary(found)}.", detail(found)]
+            parts += [f"## `{accuracy}` at {1e3 * report.dt:g} ms", f"{show.summary(found)}.", detail(found)]
             parts += _reasons(found)
-    if report.plan.steps and report.ours:
+    if report.steps and report.ours:
         place = picture and os.path.relpath(picture, page.parent).replace(os.sep, "/")
         drawn = f"![Margin of every case at every step]({place})" if place else ""
         parts += ["## At which steps each holds", drawn, f"{show.LEGEND}.", grid(report.ours)]
     if report.beside:
-        note = BESIDE.format(ms=1e3 * report.plan.dt, first=report.plan.accuracies[0])
+        note = BESIDE.format(ms=1e3 * report.dt, first=report.accuracies[0])
         parts += ["## Beside other engines", note, beside(report.beside)]
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text("\n\n".join(part for part in parts if part) + "\n", encoding="utf-8")
@@ -128,7 +127,7 @@ def _reasons(outcomes: Sequence[Outcome]) -> list[str]:
 def detail(outcomes: Sequence[Outcome]) -> str:
     """Number, case, what must and what came out, margin, status."""
     rows = [
-        (one.case.number, f"`{one.case.name}`: {one.case.title}", one.case.must, show.came_out(one), show.margin(one),
+        (one.case.number, f"`{one.case.name}`: {one.case.title}", one.case.must, one.came_out, show.margin(one),
          f"**{one.status.value}**" if one.status is Status.FAILS else one.status.value)
         for one in outcomes
     ]  # fmt: skip
@@ -139,10 +138,9 @@ def detail(outcomes: Sequence[Outcome]) -> str:
 def grid(outcomes: Sequence[Outcome]) -> str:
     """A row per case, a column per accuracy and step."""
     settings, found = show.grid(outcomes)
-    rows = []
-    for row in found:
-        case = next(one.case for one in row if one)
-        rows.append((case.number, case.name, *(show.MARKS[one.status] if one else "" for one in row)))
+    rows = [
+        (case.number, case.name, *(show.MARKS[one.status] if one else "" for one in row)) for case, row in found
+    ]  # fmt: skip
     return machine.markdown_table(("#", "case", *(f"{name}, {1e3 * dt:g} ms" for name, dt in settings)), rows)
 
 
@@ -160,7 +158,7 @@ def beside(outcomes: Sequence[Outcome]) -> str:
 def _cell(outcome: Outcome | None) -> str:
     if outcome is None:
         return ""
-    told = outcome.accuracy if outcome.status is Status.HOLDS else show.came_out(outcome)
+    told = outcome.accuracy if outcome.status is Status.HOLDS else outcome.came_out
     return f"{show.MARKS[outcome.status]} {told}"
 
 

@@ -98,10 +98,10 @@ def main(
         physics.accuracy.resolve(name)
     path = json or machine.RESULTS / ("soak_env.json" if env else "soak.json")
     console.print(machine.headline())
-    if launcher is not None:
+    place = make_place(launcher, jobs, address, path)
+    if not place.is_here:
         if env:
             raise typer.BadParameter("env is given with a launcher; allowed are random scenes, without --env")
-        place = make_place(launcher, jobs, address, path)
         spread = soak_spread.make_jobs(minutes, range(seed, seed + seeds), presets, keep, place.folder)
         _soak_there(console, place, spread, path, {"seed": seed, "seeds": seeds, "minutes": minutes})
         return
@@ -127,11 +127,7 @@ def main(
 
 def _soak_there(console: Console, place: Place, jobs: list[Job], path: Path, settings: dict) -> None:
     """Soak at a place, and write what all seeds found together."""
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("soaking", total=len(jobs))
-        found, errors = soak_spread.merge(
-            place.run(jobs), lambda name: progress.update(task, advance=1, description=name)
-        )
+    found, errors = soak_spread.merge(place.watch(jobs, console))
     for error in errors:
         console.print(f"Error: {error}", soft_wrap=True)
     if not place.is_printed:

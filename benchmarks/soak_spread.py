@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
-from rigid_env.launchers.job import Ended, Job
+from rigid_env.launchers.job import Ended, Job, shell_line
 
 MERGED = {"worlds": sum, "steps": sum, "largest_gain": max}
 
@@ -20,10 +19,9 @@ def make_jobs(
 
 
 def _make_job(minutes: float, seed: int, preset: str, keep: Path | None, folder: Path) -> Job:
-    words = ["python", "-m", "benchmarks.soak", "--minutes", repr(minutes), "--seed", str(seed), "--accuracy", preset]
-    words += ["--keep", str(keep)] if keep else []
-    words += ["--json", str(folder / f"{preset}-{seed}.json")]
-    return Job(f"{preset}, seed {seed}", partial(_soak, minutes, seed, preset, keep), shlex.join(words))
+    options = {"minutes": minutes, "seed": seed, "accuracy": preset, "keep": keep}
+    line = shell_line("python", "-m", "benchmarks.soak", **options, json=folder / f"{preset}-{seed}.json")
+    return Job(f"{preset}, seed {seed}", partial(_soak, minutes, seed, preset, keep), line)
 
 
 def _soak(minutes: float, seed: int, preset: str, keep: Path | None) -> tuple[str, dict]:
@@ -32,15 +30,11 @@ def _soak(minutes: float, seed: int, preset: str, keep: Path | None) -> tuple[st
     return preset, soak_scenes(60.0 * minutes, seed, preset, keep, lambda what: None)
 
 
-def merge(ends: Iterable[Ended], tick) -> tuple[dict, list[str]]:
-    """Add up what jobs found, by preset and family of scenes, and list the errors of jobs that ended with one.
-
-    `tick` takes the name of each job that ends.
-    """
+def merge(ends: Iterable[Ended]) -> tuple[dict, list[str]]:
+    """Add up what jobs found, by preset and family of scenes, and list the errors of jobs that ended with one."""
     found: dict[str, dict] = {}
     errors = []
     for name, result, error, _ in ends:
-        tick(name)
         if result is None:
             errors.append(f"{name}: {error}")
             continue

@@ -13,7 +13,7 @@ from benchmarks import hard_cases_page, machine
 from rigid_env.cli import app
 from rigid_env.hard_cases import registry
 from rigid_env.hard_cases.case import Case, Check, Setting
-from rigid_env.lab.hard_cases.report import Report, make_plan
+from rigid_env.lab.hard_cases.report import Report
 from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
 from rigid_env.lab.measure.machine import write_json
 
@@ -57,11 +57,10 @@ def test_a_run_of_the_command_becomes_a_page(monkeypatch, tmp_path):
 
 def test_other_engines_stand_beside_ours(monkeypatch, tmp_path):
     monkeypatch.setattr(registry, "CASES", (Case(1, "case-1", "a case", "to hold", holds, peers=True),))
-    plan = make_plan(registry.find(), "balanced", 0.01, "", True, True)
-    ours = run_case(plan.cases[0], plan.settings[0])
-    theirs = Outcome(plan.cases[0], "other", "default", 0.01, Status.FAILS, tuple(fails(plan.settings[0])), "", 1.0)
+    (case,), on = registry.find(), Setting()
+    outcomes = [run_case(case, on), Outcome(case, "other", "default", 0.01, Status.FAILS, tuple(fails(on)))]
     result, page = tmp_path / "numbers.json", tmp_path / "page.md"
-    write_json(result, Report(plan, (ours, theirs), True).to_dict())
+    write_json(result, Report((case,), outcomes=outcomes, is_complete=True).to_dict())
     write_page(result, page)
     content = page.read_text()
     assert "| # | case | rigid-env | other |" in content
@@ -70,9 +69,9 @@ def test_other_engines_stand_beside_ours(monkeypatch, tmp_path):
 
 
 def test_the_command_names_numbers_in_a_row_by_their_ends():
-    plan = make_plan(registry.find(("1", "2", "3", "5", "6", "9")), "precise", 0.02, "", False, False)
+    report = Report(registry.find(("1", "2", "3", "5", "6", "9")), ("precise",), 0.02, is_thorough=False)
     line = "rigid-env hard-cases $(seq 1 3) 5 6 9 --accuracy precise --dt 0.02 --quick --json r.json"
-    assert hard_cases_page.command(plan, Path("r.json")) == line
+    assert hard_cases_page.command(report, Path("r.json")) == line
 
 
 def test_docs_have_the_tables_of_the_result_that_is_kept():

@@ -12,7 +12,7 @@ from rigid_env.cli import names
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_shot
 from rigid_env.cli.common import Accuracy, Json, SceneArgument, app, at_least, end, tell_file, told_errors, write
 from rigid_env.cli.files import PICTURES, checked_folder, make_parents, output_option
-from rigid_env.terminal import Column, Table, make_console, number_columns, progress_bar, say
+from rigid_env.terminal import Column, Table, make_console, number_columns, progress_bar, say, ticking
 
 if TYPE_CHECKING:
     from physics import Scene
@@ -204,14 +204,8 @@ def _effect_shares(scene: Scene, duration: float, accuracy: str, console: Consol
     """Measure and print the share of a run in which each effect acts, and its computing time; returns rows for JSON."""
     from rigid_env.lab.measure import shares
 
-    with progress_bar(console, has_thread=False) as progress:
-        task = progress.add_task("measuring", total=shares.run_count(scene))
-        found = shares.measure(
-            scene,
-            duration,
-            accuracy,
-            tick=lambda name: progress.update(task, advance=1, description=name, refresh=True),
-        )
+    with ticking(console, "measuring", shares.run_count(scene)) as tick:
+        found = shares.measure(scene, duration, accuracy, tick=tick)
     console.print(shares.make_table(found, f"{duration:g} s in steps of {shares.STEP} s, without a wrench"))
     return [share.to_dict() for share in found]
 
@@ -232,10 +226,12 @@ def warmup(
 ) -> None:
     """Compile kernels ahead; what is compiled already takes no time."""
     with told_errors():
+        from dataclasses import asdict
+
         from rigid_env.lab.warmup import jobs, jobs_of, warm
 
         make_parents(json)
-        presets = [names.checked_preset(each.strip()) for each in accuracy.split(",")]
+        presets = names.listed_presets(accuracy)
         console, done = make_console(), []
         todo = jobs_of(what, presets) if what else jobs()
         with progress_bar(console) as progress:
@@ -247,4 +243,4 @@ def warmup(
                 done.append(result)
         total = sum(result.seconds for result in done)
         console.print(f"{total:7.2f} s  together")
-        write(json, {"plans": [result.to_dict() for result in done], "seconds": total}, console)
+        write(json, {"plans": [asdict(result) for result in done], "seconds": total}, console)

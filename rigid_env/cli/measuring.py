@@ -23,7 +23,7 @@ from rigid_env.cli.common import (
 )
 from rigid_env.cli.files import PLOTS, make_parents, output_option
 from rigid_env.cli.spreading import Address, Jobs, Launcher, make_place
-from rigid_env.terminal import make_console, progress_bar
+from rigid_env.terminal import make_console, progress_bar, ticking
 
 BENCH_REPEATS = 5
 QUICK_REPEATS = 2
@@ -51,12 +51,7 @@ def bench(
         sizes, env_sizes = ((module.QUICK if quick else module.FULL) for module in (workloads, environments))
         total = rows.run_count(repeats, has_peer) + environments.run_count(repeats, with_peer=False)
         found = []
-        with progress_bar(console, has_thread=False) as progress, mujoco_scene.elsewhere():
-            task = progress.add_task("measuring", total=total)
-
-            def tick(what: str) -> None:
-                progress.update(task, advance=1, description=what, refresh=True)
-
+        with ticking(console, "measuring", total) as tick, mujoco_scene.elsewhere():
             engine = rows.engine_rows(sizes, repeats, has_peer, tick)
             is_complete = collect(found, chain(engine, environments.environment_rows(env_sizes, repeats, tick=tick)))
         console.print(make_table(found, "steps per second: median, lowest .. highest"))
@@ -85,12 +80,7 @@ def effects(
         console = make_console()
         repeats, steps = (QUICK_REPEATS, costs.QUICK_STEPS) if quick else (BENCH_REPEATS, costs.STEPS)
         found = []
-        with progress_bar(console, has_thread=False) as progress:
-            task = progress.add_task("measuring", total=costs.run_count(len(chosen), repeats))
-
-            def tick(what: str) -> None:
-                progress.update(task, advance=1, description=what, refresh=True)
-
+        with ticking(console, "measuring", costs.run_count(len(chosen), repeats)) as tick:
             measured = ([costs.effect_row(name, accuracy, steps, repeats, tick)] for name in chosen)
             is_complete = collect(found, measured)
         console.print(make_table(found, "steps per second", ("with it", "without")))
@@ -137,7 +127,8 @@ def accuracy(
         place = make_place(launcher, jobs, address, json)
         make_parents(json, plot)
         shown = accuracy_report.Shown(is_full, has_goals, below)
-        report = accuracy_report.measure_and_show(console, scene or (), peers, ladder, duration, shown, place)
+        engines = names.listed(peers)
+        report = accuracy_report.measure_and_show(console, scene or (), engines, ladder, duration, shown, place)
         if json and report.results:
             accuracy_report.write_result(json, report)
             tell_file(json, console)
@@ -168,7 +159,7 @@ def tosses(
         from rigid_env.lab.tosses.report import Measurement
         from rigid_env.lab.tosses.show import show
 
-        fitted = None if fit is None else tuple(name.strip() for name in fit.split(","))
+        fitted = None if fit is None else tuple(names.listed(fit))
         effort = QUICK if quick else Effort()
         measurement = Measurement(files.load(data), accuracy, effort, seed, threads, fitted)
         console = make_console()
@@ -207,20 +198,27 @@ def hard_cases(
 ) -> None:
     """Run the hard cases, each with a known outcome; exit status 1 where one does not hold."""
     with told_errors():
+        from physics import validation
         from rigid_env.hard_cases import registry
-        from rigid_env.lab.hard_cases.picture import write_picture
-        from rigid_env.lab.hard_cases.report import make_plan, run_and_show
+        from rigid_env.lab.hard_cases.report import Report, measure
+        from rigid_env.lab.hard_cases.show import show, write_picture
 
         console = make_console()
         plot, lacking = drawable(plot, console)
-        plan = make_plan(registry.find(cases or ()), accuracy, dt, steps, not quick, peers)
+        validation.positive(dt, (), "dt")
+        presets, further = names.listed_presets(accuracy), names.listed_steps(steps)
+        report = Report(registry.find(cases or ()), presets, dt, further, not quick)
         place = make_place(launcher, jobs, address, json)
+        if peers and not place.is_here:
+            told = "peers is True with a launcher; allowed is one of the two"
+            raise ValueError(f"{told}: other engines run in this process")
         make_parents(json, plot)
-        report = run_and_show(console, plan, json, place)
+        measure(report, console, place, peers, json)
+        show(report, console)
         if json and report.outcomes:
             tell_file(json, console)
         if plot and report.outcomes:
-            write_picture(plot, report)
+            write_picture(plot, report.ours)
             tell_file(plot, console)
     end(report.is_complete, lacking)
     if report.has_failed:

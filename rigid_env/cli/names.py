@@ -1,4 +1,4 @@
-"""Names that a user types in a shell, such as scenes and presets: look them up, and complete them."""
+"""Names and lists that a user types in a shell, such as scenes and presets: look them up, and complete them."""
 
 from __future__ import annotations
 
@@ -41,6 +41,41 @@ def checked_preset(name: str | None) -> str | None:
     if name is not None and name not in PRESETS:
         raise typer.BadParameter(f"{name!r}; allowed are {', '.join(nearest_first(name, PRESETS))}")
     return name
+
+
+def listed(text: str) -> list[str]:
+    """Split a list with commas, such as ``fast,balanced``."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def listed_presets(text: str) -> list[str]:
+    """Split a list of presets with commas.
+
+    Raises
+    ------
+    ValueError
+        A name is no preset, or there is none.
+    """
+    from physics import PRESETS, validation
+
+    return [validation.one_of(name, PRESETS, "accuracy") for name in listed(text) or [text]]
+
+
+def listed_steps(text: str) -> list[float]:
+    """Split a list of steps [s] with commas.
+
+    Raises
+    ------
+    ValueError
+        A part of the list is no positive number.
+    """
+    from physics import validation
+
+    try:
+        found = [float(part) for part in listed(text)]
+    except ValueError:
+        raise ValueError(f"steps is {text!r}; allowed are numbers [s] with commas between them") from None
+    return [float(validation.positive(step, (), "steps")) for step in found]
 
 
 # --- completion in a shell -------------------------------------------------------------------------------------------

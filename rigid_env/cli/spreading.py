@@ -19,17 +19,15 @@ Jobs = Annotated[int, typer.Option(callback=at_least(1), help="Of --launcher: ho
 Address = Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")]
 
 
-def make_place(launcher: str | None, at_once: int, address: str | None, json: Path | None) -> Place | None:
-    """Make the launcher of a command's jobs, or None for this process; its files go into a folder named like `json`.
+def make_place(launcher: str | None, at_once: int, address: str | None, json: Path | None) -> Place:
+    """Make the place of a command's jobs; files that they write go into a folder named like `json`.
 
     Raises
     ------
     ValueError
         There is no such launcher, or `address` is given without one.
     """
-    if launcher is None:
-        if address is not None:
-            raise ValueError(f"address is {address!r} without a launcher; allowed with --launcher ray or submitit")
-        return None
+    if launcher is None and address is not None:
+        raise ValueError(f"address is {address!r} without a launcher; allowed with --launcher ray or submitit")
     folder = json.with_suffix("") if json is not None else Path("rigid-env-jobs")
     return Place(launcher, folder, at_once, address)

@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
+from typing import Literal
 
 import physics
 from physics.accuracy import resolve
 from physics.annotations import Preset
-from physics.plan.plan import make_plan
-
-AT_MOST, AT_LEAST, WITHIN = "at most", "at least", "within"
 
 
 class UnsupportedError(Exception):
@@ -35,7 +31,7 @@ class Check:
     unit : str
         Unit of `value`, `limit` and `expected`; empty for a pure number.
     kind : str
-        `AT_MOST`, `AT_LEAST` or `WITHIN`.
+        ``at most``; the functions `at_least` and `within` make checks of the other kinds.
     expected : float
         Known outcome, for ``within``.
     """
@@ -44,50 +40,47 @@ class Check:
     value: float
     limit: float
     unit: str = ""
-    kind: str = AT_MOST
+    kind: Literal["at most", "at least", "within"] = "at most"
     expected: float = 0.0
 
     def __post_init__(self):
-        if self.kind not in (AT_MOST, AT_LEAST, WITHIN):
-            raise ValueError(f"Check.kind is {self.kind!r}; allowed are {AT_MOST!r}, {AT_LEAST!r}, {WITHIN!r}")
         for name in ("value", "limit", "expected"):
             object.__setattr__(self, name, float(getattr(self, name)))
-
-    @property
-    def passes(self) -> bool:
-        """True if the value satisfies its condition; NaN never does."""
-        if self.kind == AT_LEAST:
-            return self.value >= self.limit
-        return self.distance <= self.limit
-
-    @property
-    def distance(self) -> float:
-        """Number compared with the limit: the distance from the expected value for ``within``, else the value."""
-        return abs(self.value - self.expected) if self.kind == WITHIN else self.value
 
     @property
     def margin(self) -> float:
         """Unused share of the limit: 1 without an error, 0 at the limit, negative beyond it, -inf for NaN or infinity.
 
-        For ``at least``: excess of the value over the limit, as a share of the limit. A limit of 0 gives 1 if it is
-        met, else -inf.
+        For ``at least``: excess of the value over the limit, as a share of the limit, 1 at most. A limit of 0 gives 1
+        if it is met, else -inf.
         """
-        if not math.isfinite(self.distance):
+        size = abs(self.value - self.expected) if self.kind == "within" else self.value
+        room = size - self.limit if self.kind == "at least" else self.limit - size
+        if not math.isfinite(room) or (self.limit == 0.0 and room < 0.0):
             return -math.inf
-        if self.limit == 0.0:
-            return 1.0 if self.passes else -math.inf
-        share = self.distance / self.limit
-        return share - 1.0 if self.kind == AT_LEAST else min(1.0, 1.0 - share)
+        return min(1.0, room / self.limit) if self.limit else 1.0
+
+    @property
+    def passes(self) -> bool:
+        """True if the value satisfies its condition; NaN and infinity never do."""
+        return self.margin >= 0.0
+
+    def __str__(self) -> str:
+        """Value with its limit, such as "depth: 1.2e-09 (≤ 1e-08) m"."""
+        unit = f" {self.unit}" if self.unit else ""
+        if self.kind == "within":
+            return f"{self.what}: {self.value:.7g} for {self.expected:.7g} ± {self.limit:.1e}{unit}"
+        return f"{self.what}: {self.value:.2g} ({'≤' if self.kind == 'at most' else '≥'} {self.limit:.2g}){unit}"
 
 
 def within(what: str, value: float, expected: float, limit: float, unit: str = "") -> Check:
     """Make the check |value - expected| <= limit."""
-    return Check(what, value, limit, unit, WITHIN, expected)
+    return Check(what, value, limit, unit, "within", expected)
 
 
 def at_least(what: str, value: float, limit: float, unit: str = "") -> Check:
     """Make the check value >= limit."""
-    return Check(what, value, limit, unit, AT_LEAST)
+    return Check(what, value, limit, unit, "at least")
 
 
 def none_of(what: str, wrong: int | bool) -> Check:
@@ -127,8 +120,9 @@ class Setting:
         """
         if self.maker is not None:
             return self.maker(scene, self.dt)
+        accuracy = resolve(self.accuracy)  # an unknown preset is an error, and no reason for "not supported"
         try:
-            make_plan(scene, resolve(self.accuracy))
+            physics.make_plan(scene, accuracy)
         except ValueError as error:
             raise UnsupportedError(str(error)) from error
         return physics.World(scene, worlds=worlds, dt=self.dt, accuracy=self.accuracy)
@@ -159,7 +153,7 @@ class Setting:
 
     def steps(self, duration: float) -> int:
         """Smallest number of steps that take at least `duration` [s], up to rounding."""
-        return max(1, math.ceil(duration / self.dt * (1 - 4 * np.finfo(float).eps)))
+        return max(1, math.ceil(duration / self.dt * (1 - 4 * math.ulp(1.0))))
 
     def pick(self, thorough, quick):
         """Return `thorough` in a thorough run, else `quick`."""

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+import pkgutil
 from collections.abc import Sequence
 from importlib import import_module
 
 from physics.keywords import nearest_first
+from rigid_env.hard_cases import cases
 from rigid_env.hard_cases.case import Case
 
-# Modules of `rigid_env.hard_cases.cases`; each defines a tuple CASES.
-MODULES = (
-    "flight", "bounces", "impacts", "friction", "rolling", "tipping", "scaling", "piles", "leaning", "arch",
-    "chains", "stiff", "turning", "letting_go", "random_scenes", "company",
-)  # fmt: skip
-
-
-_GATHERED = (case for name in MODULES for case in import_module(f"rigid_env.hard_cases.cases.{name}").CASES)
+# A module of `cases` that defines cases has a tuple CASES.
+_MODULES = [import_module(f"{cases.__name__}.{found.name}") for found in pkgutil.iter_modules(cases.__path__)]
+_GATHERED = (case for module in _MODULES for case in getattr(module, "CASES", ()))
 CASES: tuple[Case, ...] = tuple(sorted(_GATHERED, key=lambda case: case.number))
 
 
@@ -27,12 +24,9 @@ def find(wanted: Sequence[str] = ()) -> tuple[Case, ...]:
     ValueError
         There is no case with such a name or number.
     """
-    known = {key: case for case in CASES for key in (case.name, str(case.number))}
+    numbers, names = [str(case.number) for case in CASES], [case.name for case in CASES]
     for name in wanted:
-        if name not in known:
-            raise ValueError(
-                f"case is {name!r}; allowed are numbers from {CASES[0].number} to {CASES[-1].number}, and "
-                + ", ".join(nearest_first(name, [case.name for case in CASES]))
-            )
-    chosen = {known[name].number for name in wanted} or {case.number for case in CASES}
-    return tuple(case for case in CASES if case.number in chosen)
+        if name not in (*numbers, *names):
+            allowed = f"numbers from {numbers[0]} to {numbers[-1]}, and {', '.join(nearest_first(name, names))}"
+            raise ValueError(f"case is {name!r}; allowed are {allowed}")
+    return tuple(case for case in CASES if not wanted or {case.name, str(case.number)} & set(wanted))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import gymnasium
@@ -49,10 +49,6 @@ class Warmed:
     accuracy: str
     seconds: float
     compiled: int
-
-    def to_dict(self) -> dict:
-        """Result as a dict for JSON."""
-        return asdict(self)
 
 
 def jobs() -> list[Job]:

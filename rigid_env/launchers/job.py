@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,18 @@ class Job:
     call: Callable[[], Any]
     command: str
     warm: Callable[[], None] | None = None
+
+
+def shell_line(*words: object, **options: object) -> str:
+    """Make a line for a shell: the words, then ``--name value`` for each option.
+
+    An option that is True has no value; one that is None or False is left out.
+    """
+    line = list(words)
+    for name, value in options.items():
+        if value is not None and value is not False:
+            line += [f"--{name}"] if value is True else [f"--{name}", value]
+    return shlex.join(map(str, line))
 
 
 class Stopped(Exception):

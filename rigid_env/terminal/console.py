@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -40,6 +42,17 @@ def progress_bar(console: Console, has_thread: bool = True) -> Progress:
     columns = (description, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     is_hidden = not console.is_terminal
     return Progress(*columns, console=console, transient=True, auto_refresh=has_thread, disable=is_hidden)
+
+
+@contextmanager
+def ticking(console: Console, what: str, total: int) -> Iterator[Callable[[str], None]]:
+    """Context manager of a progress bar for a measurement, which no thread disturbs.
+
+    Yields a function that counts one of `total` parts, and shows its text in place of `what`.
+    """
+    with progress_bar(console, has_thread=False) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda text: progress.update(task, advance=1, description=text, refresh=True)
 
 
 def say(console: Console, label: str, text: str | Text) -> None:

@@ -244,7 +244,7 @@ def test_scenes_are_printed_as_lines_for_a_shell(tmp_path):
 def test_a_scene_that_is_lost_is_an_error():
     (job,) = accuracy.make_jobs(["slide"], ladder=QUICK)
     with pytest.raises(ValueError, match="slide: its process ended"):
-        list(accuracy_jobs.found([job], [Ended("slide", None, "its process ended")], lambda what: None))
+        list(accuracy_jobs.found([job], [Ended("slide", None, "its process ended")]))
 
 
 def test_an_interrupted_command_writes_what_it_has_and_says_so(tmp_path, monkeypatch):

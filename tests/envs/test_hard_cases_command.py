@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
+import physics
 from rigid_env.cli import app
 from rigid_env.hard_cases import registry
-from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-from rigid_env.lab.hard_cases import report
-from rigid_env.lab.hard_cases.peers import run_peer
-from rigid_env.lab.hard_cases.run import Outcome, Status, run_case
+from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError, within
+from rigid_env.lab.hard_cases.report import Report, measure
+from rigid_env.lab.hard_cases.run import Outcome, Status, run_case, run_peer
 from rigid_env.lab.measure.peers import load
 from rigid_env.launchers.job import Ended
 from rigid_env.launchers.place import Place
@@ -122,13 +124,15 @@ def test_the_picture_is_drawn(monkeypatch, tmp_path):
 
 def test_other_engines_stand_beside_ours(monkeypatch):
     monkeypatch.setattr(registry, "CASES", (Case(1, "case-1", "a case", "to hold", holds, peers=True),))
-    plan = report.make_plan(registry.find(), "balanced,precise", 0.01, "", True, True)
-    ours = [run_case(plan.cases[0], on) for on in plan.settings]
-    theirs = Outcome(plan.cases[0], "other", "default", 0.01, Status.FAILS, tuple(fails(plan.settings[0])), "", 1.0)
-    found = report.Report(plan, (*ours, theirs), True)
+    found = Report(registry.find(), ("balanced", "precise"))
+    (case,) = found.cases
+    ours = [run_case(case, Setting(name)) for name in found.accuracies]
+    theirs = Outcome(case, "other", "default", 0.01, Status.FAILS, tuple(fails(Setting())))
+    found.outcomes = [*ours, theirs]
     assert found.beside == [ours[0], theirs]
     assert not found.has_failed
-    assert report.Report(plan, tuple(ours), True).beside == []
+    found.outcomes = ours
+    assert found.beside == []
 
 
 def test_another_engine_runs_a_case_at_the_first_setting_that_holds():
@@ -137,6 +141,37 @@ def test_another_engine_runs_a_case_at_the_first_setting_that_holds():
     outcome = run_peer(parabola, load("mujoco"), Setting(is_thorough=False))
     # Its default integrator is of first order; RK4 is exact on a parabola.
     assert (outcome.status, outcome.engine, outcome.accuracy) == (Status.HOLDS, "mujoco", "RK4")
+
+
+class Still:
+    """Engine in which nothing moves, with more settings for scenes with walls."""
+
+    name, version = "still", "1"
+
+    def settings(self, scene):
+        return {name: {"index": k} for k, name in enumerate(("default", "fine", "finest")[: 3 if scene.walls else 2])}
+
+    def open(self, scene, dt, index):
+        pos = np.full((1, 3), float(index))
+        state = (pos, np.zeros((1, 4)), np.zeros((1, 3)), np.zeros((1, 3)))
+        return SimpleNamespace(restart=lambda: None, advance=lambda steps: None, state=lambda: state)
+
+
+@pytest.mark.parametrize(
+    ("walls", "must_be", "outcome"),
+    [((), 1, "fine"), ((), 9, "default"), ((physics.HalfSpace((0, 1, 0)),), 2, "finest")],
+)
+def test_another_engine_is_tried_at_all_settings_that_it_has_for_the_scene(walls, must_be, outcome):
+    tried = []
+
+    def place(on: Setting):
+        tried.append(on.world(physics.Scene([physics.Sphere(1.0, 1.0)], walls, [physics.Contact()])).pos[0, 0, 0])
+        return [within("place", tried[-1], must_be, 0.0)]
+
+    found = run_peer(Case(1, "a", "a", "a", place), Still(), Setting())
+    assert (found.engine, found.accuracy) == ("still", outcome)
+    assert tried == list(range(len(tried)))
+    assert len(tried) == (3 if walls else 2)
 
 
 def test_what_another_engine_cannot_express_is_said():
@@ -169,14 +204,14 @@ def test_cases_are_printed_as_lines_for_a_shell(tmp_path):
 
 
 def test_a_run_that_is_lost_fails_and_says_why(monkeypatch, tmp_path):
-    (case,) = replace_cases(monkeypatch, holds)
-    plan = report.make_plan((case,), "balanced", 0.01, "", True, False)
+    report = Report(replace_cases(monkeypatch, holds))
 
     class Losing(Place):
         def run(self, jobs):
             return (Ended(job.name, None, "its process ended") for job in jobs)
 
-    (outcome,) = report.run_and_show(Console(quiet=True), plan, place=Losing("local", tmp_path)).outcomes
+    measure(report, Console(quiet=True), Losing("local", tmp_path))
+    (outcome,) = report.outcomes
     assert outcome.status is Status.FAILS
     assert outcome.reason == "its process ended"
 

@@ -7,11 +7,13 @@ import shlex
 from functools import partial
 
 import pytest
+from rich.console import Console
+from rich.progress import Progress
 
 from rigid_env import launchers
-from rigid_env.launchers import local, printed
-from rigid_env.launchers.job import RETRIES, Ended, Job, run_job
-from rigid_env.launchers.place import Place
+from rigid_env.launchers import local, place, printed
+from rigid_env.launchers.job import RETRIES, Ended, Job, run_job, shell_line
+from rigid_env.launchers.place import HERE, Place
 
 
 def divide(a: float, b: float) -> float:
@@ -68,6 +70,34 @@ def test_printed_jobs_are_lines_for_a_shell(tmp_path, capsys):
     assert capsys.readouterr().out == "echo 'a b'\nls\n"
     assert Place("print", tmp_path).is_printed
     assert not Place("local", tmp_path).is_printed
+
+
+def test_a_shell_line_has_the_options_that_are_set():
+    line = shell_line("do", 4, names="a b", dt=0.01, quick=True, thorough=False, address=None, seed=0)
+    assert shlex.split(line) == ["do", "4", "--names", "a b", "--dt", "0.01", "--quick", "--seed", "0"]
+
+
+def test_jobs_run_one_after_the_other_in_this_process():
+    done = []
+
+    def call(k: int) -> int:
+        done.append(k)
+        return k
+
+    ends = HERE.watch([Job(str(k), partial(call, k), "") for k in (3, 1)], Console(quiet=True))
+    assert next(ends) == Ended("3", 3)
+    assert done == [3]
+    assert next(ends) == Ended("1", 1)
+    assert list(ends) == []
+
+
+def test_a_bar_names_the_first_job_that_has_not_ended(tmp_path, monkeypatch):
+    bar = Progress(console=Console(quiet=True))
+    monkeypatch.setattr(place, "progress_bar", lambda console: bar)
+    monkeypatch.setattr(Place, "run", lambda self, jobs: (Ended(name, 1) for name in ("two", "one", "three")))
+    jobs = [Job(name, partial(divide, 1.0, 2.0), "") for name in ("one", "two", "three")]
+    shown = [(end.name, bar.tasks[0].description) for end in Place("local", tmp_path).watch(jobs, Console(quiet=True))]
+    assert shown == [("two", "one"), ("one", "three"), ("three", "")]
 
 
 def test_an_unknown_launcher_is_refused(tmp_path):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 import physics
-from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.case import Case, Check, Setting, at_least, none_of
 from rigid_env.hard_cases.cases import stacks
 from rigid_env.hard_cases.cases.stacks import G
 
@@ -51,7 +51,7 @@ def cards(setting: Setting) -> list[Check]:
     stands = 3 * setting.slop * math.hypot(length, thickness, 0.5) / 2 if setting.is_ours else stacks.STANDING * length
     return [
         Check("1 % above the limit: moved", moved[0], stands, "m"),
-        Check("1 % below the limit: moved", moved[1], 1e-3, "m", "at least"),
+        at_least("1 % below the limit: moved", moved[1], 1e-3, "m"),
     ]
 
 
@@ -89,7 +89,7 @@ def ladder(setting: Setting) -> list[Check]:
     creep = setting.tolerance * G * setting.dt * duration
     return [
         Check("0.1 % above the limit: moved", moved[0], creep if setting.is_ours else stacks.STANDING * length, "m"),
-        Check("0.1 % below the limit: moved", moved[1], 0.02, "m", "at least"),
+        at_least("0.1 % below the limit: moved", moved[1], 0.02, "m"),
     ]
 
 

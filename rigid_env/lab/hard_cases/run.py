@@ -1,17 +1,18 @@
-"""Run one hard case at one setting; an exception in it becomes an outcome, too."""
+"""Run one hard case at one setting, in our engine or in another one."""
 
 from __future__ import annotations
 
-import math
+import itertools
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 
+import physics
+from physics.work_precision.contender import OURS
 from rigid_env.hard_cases.case import Case, Check, Setting, UnsupportedError
-
-OURS = "rigid-env"
+from rigid_env.lab.measure.peers import Engine, Unsupported
 
 
 class Status(Enum):
@@ -46,50 +47,84 @@ class Outcome:
     engine: str
     accuracy: str
     dt: float
-    status: Status
-    checks: tuple[Check, ...]
-    reason: str
-    seconds: float
+    status: Status = Status.FAILS
+    checks: tuple[Check, ...] = ()
+    reason: str = ""
+    seconds: float = 0.0
 
     @property
     def tightest(self) -> Check | None:
         """Check with the smallest margin, the first among equals; None if there are no checks."""
         return min(self.checks, key=lambda check: check.margin, default=None)
 
+    @property
+    def came_out(self) -> str:
+        """Text of the tightest check. Without checks: the reason for having none."""
+        return str(self.tightest) if self.checks else self.reason
+
     def to_dict(self) -> dict:
-        """Outcome as a dict for JSON; numbers that are not finite become null."""
-        return {
-            "number": self.case.number, "name": self.case.name, "engine": self.engine, "accuracy": self.accuracy,
-            "dt": self.dt, "status": self.status.value, "reason": self.reason, "seconds": self.seconds,
-            "checks": [_check_to_dict(check) for check in self.checks],
-        }  # fmt: skip
+        """Outcome as a dict for JSON, with the number and the name of the case."""
+        checks = [{**vars(check), "passes": check.passes, "margin": check.margin} for check in self.checks]
+        rest = {**vars(self), "status": self.status.value, "checks": checks}
+        case = rest.pop("case")
+        return {"number": case.number, "name": case.name, **rest}
 
 
-def _check_to_dict(check: Check) -> dict:
-    numbers = {name: getattr(check, name) for name in ("value", "limit", "expected", "margin")}
-    finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
-    return {"what": check.what, "kind": check.kind, "unit": check.unit, "passes": check.passes, **finite}
-
-
-def run_case(case: Case, setting: Setting, engine: str = OURS, accuracy: str | None = None) -> Outcome:
-    """Run one case at one setting.
-
-    Parameters
-    ----------
-    case : Case
-    setting : Setting
-    engine, accuracy : str
-        Names for the outcome, as in `Outcome`; without `accuracy` the setting's preset.
-    """
+def run_case(case: Case, setting: Setting) -> Outcome:
+    """Run one case at one setting; an exception in it becomes an outcome, too."""
     start, checks = time.perf_counter(), ()
     try:
         with np.errstate(all="ignore"):  # the checks report numbers that are not finite
             checks = tuple(case.run(setting))
         status = Status.HOLDS if checks and all(check.passes for check in checks) else Status.FAILS
         reason = "" if checks else "no check was made"
-    except UnsupportedError as error:
+    except (UnsupportedError, Unsupported) as error:
         status, reason = Status.UNSUPPORTED, str(error)
     except Exception as error:  # an error in one case must not end the run of the others
         status, reason = Status.FAILS, f"{type(error).__name__}: {error}"
-    seconds = time.perf_counter() - start
-    return Outcome(case, engine, accuracy or str(setting.accuracy), setting.dt, status, checks, reason, seconds)
+    return Outcome(case, OURS, str(setting.accuracy), setting.dt, status, checks, reason, time.perf_counter() - start)
+
+
+class PeerWorld:
+    """World of another engine for a hard case: only state, `time` and `step` of a `physics.World` of one world."""
+
+    def __init__(self, engine: Engine, scene: physics.Scene, dt: float, **options):
+        self._run = engine.open(scene, dt, **options)
+        self._run.restart()
+        self.dt, self.time = dt, 0.0
+        self._look()
+
+    def _look(self) -> None:
+        self.pos, self.quat, self.linvel, self.angvel = (np.asarray(part)[None] for part in self._run.state())
+
+    def step(self, wrench=None, steps: int = 1) -> None:
+        """Advance by `steps` steps; this interface cannot pass a wrench to the engine."""
+        if wrench is not None:
+            raise Unsupported("a wrench is not handed to this engine")
+        self._run.advance(steps)
+        self.time += steps * self.dt
+        self._look()
+
+
+def run_peer(case: Case, engine: Engine, setting: Setting) -> Outcome:
+    """Run a case in another engine at the engine's settings, one after the other, until it holds or is not supported.
+
+    Returns the outcome that holds; if there is none, the outcome at the first setting, the engine's defaults. Its
+    accuracy is the name of the setting in the first world that the case makes.
+    """
+    first, most = None, 1  # most: largest number of settings that a world of the case has
+    for index in itertools.count():
+        names = []  # of the settings of the case's worlds
+
+        def make(scene: physics.Scene, dt: float, index=index, names=names) -> PeerWorld:
+            nonlocal most
+            known = engine.settings(scene)
+            most = max(most, len(known))
+            names.append(list(known)[min(index, len(known) - 1)])
+            return PeerWorld(engine, scene, dt, **known[names[-1]])
+
+        outcome = run_case(case, replace(setting, maker=make))
+        outcome = replace(outcome, engine=engine.name, accuracy=names[0] if names else "default")
+        first = first or outcome
+        if outcome.status is not Status.FAILS or index + 1 >= most:
+            return outcome if outcome.status is Status.HOLDS else first

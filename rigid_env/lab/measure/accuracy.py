@@ -128,21 +128,21 @@ def names() -> list[str]:
     return known + [name for name in alone if name not in known]
 
 
-def load_peers(wanted: Sequence[str]) -> tuple[dict[str, peers.Engine], list[str]]:
-    """Load other engines by name; returns the installed ones, and a message for each missing one.
+def load_peers(wanted: Sequence[str], tell: Tick = lambda what: None) -> dict[str, peers.Engine]:
+    """Load those of the other engines `wanted` that are installed; `tell` is called with a text for each missing one.
 
     Raises
     ------
     ValueError
         There is no engine of such a name.
     """
-    found, missing = {}, []
+    found = {}
     for name in wanted:
         try:
             found[name] = peers.load(name)
         except ModuleNotFoundError as error:
-            missing.append(str(error))
-    return found, missing
+            tell(f"skipped: {error}")
+    return found
 
 
 def make_jobs(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,8 +15,8 @@ from rigid_env.lab.measure.accuracy import Found, Ladder
 from rigid_env.lab.measure.accuracy_table import MARKS, answers, goals, make_table, summary
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.lab.measure.mujoco_scene import elsewhere
-from rigid_env.launchers.place import Place
-from rigid_env.terminal import progress_bar
+from rigid_env.launchers.place import HERE, Place
+from rigid_env.terminal import ticking
 
 
 @dataclass(frozen=True)
@@ -60,23 +60,23 @@ class Shown:
 def measure_and_show(
     console: Console,
     scenes: Sequence[str] = (),
-    peers: str = "",
+    peers: Sequence[str] = (),
     ladder: Ladder | None = None,
     duration: float | None = None,
     shown: Shown | None = None,
-    place: Place | None = None,
+    place: Place = HERE,
 ) -> Report:
     """Measure scenes, and print the table of each as soon as it is measured.
 
-    With a `place`, each scene is measured by one of its jobs. A place that prints its jobs measures none.
+    At another place than this process, each scene is a job. A place that prints its jobs measures none.
 
     Parameters
     ----------
     console : Console
     scenes : sequence of str
         See `accuracy.make_jobs`.
-    peers : str
-        Names of other engines, with commas.
+    peers : sequence of str
+        Names of other engines.
     ladder : Ladder, optional
     duration : float, optional
         See `accuracy.make_jobs`.
@@ -92,32 +92,29 @@ def measure_and_show(
     if shown.below is not None:
         validation.positive(shown.below, (), "below")
     ladder = ladder or Ladder()
-    engines, missing = accuracy.load_peers([name.strip() for name in peers.split(",") if name.strip()])
-    for message in missing:
-        console.print(f"skipped: {message}")
+    engines = accuracy.load_peers(peers, console.print)
     if engines:
         console.print("peers: " + ", ".join(f"{e.name} {e.version}" for e in engines.values()))
     jobs = accuracy.make_jobs(scenes, engines, ladder, duration)
-    spread = [] if place is None else accuracy_jobs.make_jobs(jobs, place.folder, tuple(engines), ladder, duration)
-    if place is not None and place.is_printed:
-        list(place.run(spread))
-        return Report((), ladder, is_complete=True)
-    results, total = [], len(jobs) if place else accuracy.run_count(jobs, ladder)
-    with progress_bar(console, has_thread=False) as progress, elsewhere():
-        task = progress.add_task("accuracy", total=total)
-
-        def tick(what: str) -> None:
-            progress.update(task, advance=1, description=what, refresh=True)
-
-        here = place is None
-        for found in accuracy.run(jobs, ladder, tick) if here else accuracy_jobs.found(jobs, place.run(spread), tick):
+    spread = accuracy_jobs.make_jobs([job.key for job in jobs], place.folder, tuple(engines), ladder, duration)
+    results = []
+    with elsewhere():
+        here = place.is_here
+        for found in _here(jobs, ladder, console) if here else accuracy_jobs.found(jobs, place.watch(spread, console)):
             results.append(found)
             _show(console, found, shown)
+    if place.is_printed:
+        return Report((), ladder, is_complete=True)
     console.print(MARKS, style="dim")
     for line in [line for found in results for line in (answers(found, shown.below) if shown.below else ())]:
         console.print(line, soft_wrap=True)
     is_complete = len(results) == len(jobs) and all(found.frontier.is_complete for found in results)
     return Report(tuple(results), ladder, is_complete)
+
+
+def _here(jobs: Sequence[accuracy.Job], ladder: Ladder, console: Console) -> Iterator[Found]:
+    with ticking(console, "accuracy", accuracy.run_count(jobs, ladder)) as tick:
+        yield from accuracy.run(jobs, ladder, tick)
 
 
 def write_result(path: Path, report: Report) -> None:

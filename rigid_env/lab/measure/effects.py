@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import physics
-from physics import scenes
-from physics.keywords import nearest_first
-from rigid_env.lab.measure.timing import Row, Stopwatch, interleave
+from physics import scenes, validation
+from rigid_env.lab.measure.timing import Row, interleave
+from rigid_env.lab.measure.workloads import Steps
 
 STEP = 0.005  # [s]
 STEPS = 20_000  # steps of one run
@@ -104,20 +104,6 @@ CASES: dict[str, Callable[[], tuple[physics.Scene, physics.Scene]]] = {
 }
 
 
-class Steps:
-    """Callable that runs steps of one world from its start, and returns steps per second."""
-
-    def __init__(self, scene: physics.Scene, accuracy: str, steps: int):
-        self.world = physics.World(scene, dt=STEP, accuracy=accuracy)
-        self.start, self.steps = self.world.snapshot(), steps
-
-    def __call__(self) -> float:
-        self.world.restore(self.start)
-        with Stopwatch() as watch:
-            self.world.step(steps=self.steps)
-        return self.steps / watch.seconds
-
-
 def bytes_per_body(world: physics.World) -> int:
     """Bytes that a world stores per body for parameters and sleep."""
     return (world.params.nbytes + world.sleep.nbytes) // (world.worlds * world.body_count)
@@ -132,8 +118,7 @@ def chosen(names: Sequence[str]) -> list[str]:
         A name that is not in `CASES`.
     """
     for name in names:
-        if name not in CASES:
-            raise ValueError(f"effect is {name!r}; allowed are {', '.join(nearest_first(name, CASES))}")
+        validation.one_of(name, CASES, "effect")
     return list(names or CASES)
 
 
@@ -151,10 +136,11 @@ def effect_row(name: str, accuracy: str, steps: int, repeats: int, tick: Callabl
         Steps per second with the effect, compared with those without it. `notes` has the time that the effect adds to a
         step [ns], and the bytes of parameters that it adds per body.
     """
-    runners = {key: Steps(scene, accuracy, steps) for key, scene in zip((ON, OFF), CASES[name]())}
+    worlds = {key: physics.World(scene, dt=STEP, accuracy=accuracy) for key, scene in zip((ON, OFF), CASES[name]())}
+    runners = {key: Steps(world, steps) for key, world in worlds.items()}
     told = None if tick is None else lambda key: tick(f"{name}: {key}")
     spreads = interleave(runners, repeats, told)
-    stored = {key: bytes_per_body(runner.world) for key, runner in runners.items()}
+    stored = {key: bytes_per_body(world) for key, world in worlds.items()}
     added = 1e9 / spreads[ON].median - 1e9 / spreads[OFF].median
     return Row(
         key=name, what=name, unit="steps/s", ours=spreads[ON], accuracy=accuracy, peer_name="the scene without it",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import os
 import platform
 import subprocess
@@ -78,9 +79,23 @@ def _git(folder: Path, *arguments: str) -> str:
     return done.stdout.strip()
 
 
-def write_json(path: str | Path, content: dict) -> None:
-    """Write a result as JSON, with a description of the machine under ``machine``; makes missing folders."""
+def write_json(path: str | Path | None, content: dict) -> None:
+    """Write a result as JSON, with a description of the machine under ``machine``; makes missing folders.
+
+    Numbers that are not finite become null, since JSON has none. Without a path nothing is written.
+    """
+    if path is None:
+        return
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({**content, "machine": describe()}, indent=2, allow_nan=False)
+    text = json.dumps({**_finite(content), "machine": describe()}, indent=2, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
+
+
+def _finite(content):
+    """Copy of JSON content with None in place of numbers that are not finite."""
+    if isinstance(content, dict):
+        return {key: _finite(value) for key, value in content.items()}
+    if isinstance(content, (list, tuple)):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not math.isfinite(content) else content

@@ -15,7 +15,8 @@ import numpy as np
 from rich.text import Text
 
 import physics
-from rigid_env.lab.measure.timing import Spread, Stopwatch, interleave
+from rigid_env.lab.measure.timing import Spread, interleave
+from rigid_env.lab.measure.workloads import Steps
 from rigid_env.terminal import Column, Table, number_columns
 
 STEP = 0.01  # [s] default step of `rigid-env run`
@@ -105,19 +106,6 @@ def acted_shares(world: physics.World, others: list[physics.World], steps: int) 
     return (acted / steps).tolist()
 
 
-class _Run:
-    """Callable that runs a world's steps from its start, and returns the computing time [s]."""
-
-    def __init__(self, world: physics.World, steps: int):
-        self.world, self.steps, self.start = world, steps, world.snapshot()
-
-    def __call__(self) -> float:
-        self.world.restore(self.start)
-        with Stopwatch() as watch:
-            self.world.step(steps=self.steps)
-        return watch.seconds
-
-
 def run_count(scene: physics.Scene, repeats: int = REPEATS) -> int:
     """Number of calls of `tick` by `measure`."""
     return (len(scene.effects) + 1) * (repeats + 1)
@@ -148,12 +136,12 @@ def measure(
     worlds = {WHOLE: physics.World(scene, dt=STEP, accuracy=accuracy)}
     for name, effect in zip(names, scene.effects):
         worlds[name] = physics.World(without(scene, effect), dt=STEP, accuracy=accuracy)
-    runs = {name: _Run(world, steps) for name, world in worlds.items()}
+    runs = {name: Steps(world, steps) for name, world in worlds.items()}
     spreads = interleave(runs, repeats, tick)
     for run in runs.values():
         run.world.restore(run.start)
     acted = acted_shares(worlds[WHOLE], [worlds[name] for name in names], steps)
-    ratios = {name: spreads[name] / spreads[WHOLE] for name in names}
+    ratios = {name: spreads[WHOLE] / spreads[name] for name in names}  # of times, by speeds
     return [
         Share(name, share, Spread(tuple(1.0 - ratio for ratio in ratios[name].samples)))
         for name, share in zip(names, acted)

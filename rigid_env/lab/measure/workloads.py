@@ -66,6 +66,19 @@ def random_poses(worlds: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray]:
     return pos, quat / np.linalg.norm(quat, axis=-1, keepdims=True)
 
 
+class Steps:
+    """Work of any world: a number of steps from its start."""
+
+    def __init__(self, world: physics.World, steps: int):
+        self.world, self.steps, self.start = world, steps, world.snapshot()
+
+    def __call__(self) -> float:
+        self.world.restore(self.start)
+        with Stopwatch() as watch:
+            self.world.step(steps=self.steps)
+        return self.steps / watch.seconds
+
+
 class Flight:
     """Work of the block in free flight: it tumbles high above the floor, `FLIGHT_STEPS` steps at a time."""
 

@@ -7,7 +7,7 @@ flight. They also give the position of the centre of mass relative to the tracke
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,10 +49,6 @@ class Flight:
     linvel_noise: tuple[float, ...]
     angvel_noise: tuple[float, ...]
     linvel_bias: tuple[float, ...]
-
-    def to_dict(self) -> dict:
-        """Quantities as a dict for JSON."""
-        return asdict(self)
 
 
 def rest_scale(tosses: Tosses) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -38,9 +38,9 @@ class Limits:
     def to_dict(self) -> dict:
         """Limits as a dict for JSON."""
         return {
-            "noise_floor": self.noise.to_dict(),
-            "landed_on_the_measured_face": self.landed and self.landed.to_dict(),
-            "landed_on_another_face": self.missed and self.missed.to_dict(),
+            "noise_floor": asdict(self.noise),
+            "landed_on_the_measured_face": self.landed and asdict(self.landed),
+            "landed_on_another_face": self.missed and asdict(self.missed),
             "along_the_toss": {"position": self.along_position.tolist(), "rotation": self.along_rotation.tolist()},
         }
 

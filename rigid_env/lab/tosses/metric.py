@@ -7,7 +7,7 @@ mean and the median of these means.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -41,10 +41,6 @@ class Summary:
             len(position), float(position.mean()), float(np.median(position)), float(rotation.mean()),
             float(np.median(rotation)),
         )  # fmt: skip
-
-    def to_dict(self) -> dict:
-        """Summary as a dict for JSON."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -68,7 +68,7 @@ class Case:
         """Result as a dict for JSON."""
         return {
             "name": self.setup.name, "recording": vars(self.setup.recording), "fit": self.fit.to_dict(),
-            "trained": self.trained.to_dict(), "rest": self.rest.to_dict(), "all": self.every.to_dict(),
+            "trained": asdict(self.trained), "rest": asdict(self.rest), "all": asdict(self.every),
             "lifted": self.lifted,
         }  # fmt: skip
 
@@ -95,7 +95,7 @@ class Rung:
     def to_dict(self) -> dict:
         """Errors as a dict for JSON."""
         return {
-            "accuracy": self.accuracy, "rest": self.rest.to_dict(), "all": self.every.to_dict(),
+            "accuracy": self.accuracy, "rest": asdict(self.rest), "all": asdict(self.every),
             "us_per_simulated_second": self.us,
         }  # fmt: skip
 
@@ -123,7 +123,7 @@ class Report:
         return {
             "tosses": len(self.tosses), "frames": len(self.tosses.states), "fit_accuracy": self.accuracy,
             "split_seed": self.seed, "training_share": data.TRAINING_SHARE, "is_complete": self.is_complete,
-            "flight": self.flight.to_dict(), "length_scale": self.scale,
+            "flight": asdict(self.flight), "length_scale": self.scale,
             "cases": [case.to_dict() for case in self.cases], "ladder": [rung.to_dict() for rung in self.ladder],
             "limits": self.limits and self.limits.to_dict(), "targets": TARGETS,
             "peers_at_all": {name: {"position_mean": p, "rotation_mean": r} for name, (p, r) in PEERS.items()},

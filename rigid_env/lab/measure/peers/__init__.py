@@ -10,7 +10,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 
-from physics.keywords import nearest_first
+from physics import validation
 from rigid_env.lab.measure.peers.contender import Engine, PeerContender, Unsupported
 
 # Name: (module in this package, its class, package of the engine)
@@ -51,6 +51,4 @@ def load(name: str) -> Engine:
 
 
 def _entry(name: str) -> tuple[str, str, str]:
-    if name not in ENGINES:
-        raise ValueError(f"peer is {name!r}; allowed are {', '.join(nearest_first(name, ENGINES))}")
-    return ENGINES[name]
+    return ENGINES[validation.one_of(name, ENGINES, "peer")]
