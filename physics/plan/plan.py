@@ -44,7 +44,7 @@ class Plan(Switches):
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
-            self.hulls, self.capsules, self.sleeping, self.fixed, self.grouped, self.features,
+            self.hulls, self.capsules, self.sleeping, self.fixed, self.lone, self.grouped, self.features,
             self.material_columns > 0, self.walls_differ, self.pair_materials, self.motion_columns > 0, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -108,6 +108,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         integrator=integrator if integrator > 0 else None,
         meeting=needs.meeting,
         fixed=needs.fixed or None,
+        lone=needs.lone or None,
         grouped=needs.grouped or None,
         ellipsoids=needs.ellipsoids or None,
         hulls=needs.hulls or None,

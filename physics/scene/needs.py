@@ -52,6 +52,8 @@ class Needs:
     walls_differ, pair_materials : bool
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
+    lone : bool
+        Whether exactly one body moves, and it can touch fixed bodies.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
@@ -87,6 +89,7 @@ class Needs:
     material_columns: int
     walls_differ: bool
     pair_materials: bool
+    lone: bool
     grouped: bool
     motion_columns: int
     linked: bool
@@ -144,6 +147,7 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
+        lone=meeting and fixed and len(axes) == 1,
         grouped=grouped,
         motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),

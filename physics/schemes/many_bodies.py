@@ -9,7 +9,11 @@ import numpy as np
 
 from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
 from physics.kernels.multibody.data import allocation
-from physics.kernels.multibody.stepping.adaptive_substep import MIN_RELATIVE_SLOP, MIN_SOLVER_TOLERANCE
+from physics.kernels.multibody.stepping.adaptive_substep import (
+    LONE_RELATIVE_SLOP,
+    MIN_RELATIVE_SLOP,
+    MIN_SOLVER_TOLERANCE,
+)
 from physics.kernels.multibody.stepping.step import step_many
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.effects import Contact
@@ -66,13 +70,15 @@ class ManyBodies(Scheme):
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)
+        if self.is_error_controlled and switches.lone:
+            accuracy = replace(accuracy, slop=max(accuracy.slop, LONE_RELATIVE_SLOP))
         fixed = np.array([body.fixed for body in scene.bodies], np.int64) if switches.fixed else None
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
             groups=group_table(scene) if switches.grouped else None,
             capsules=switches.capsules,
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            motion_columns=switches.motion_columns, meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, lone=switches.lone, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip
@@ -82,7 +88,8 @@ class ManyBodies(Scheme):
         if not self.is_error_controlled:
             return None
         bodies, walls = len(scene.bodies), len(scene.walls)
-        return allocation.make_snapshots(bodies, allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies)))
+        memory = allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies))
+        return allocation.make_snapshots(bodies, memory, switches.lone)
 
     def acting(self, accuracy: Accuracy) -> Accuracy:
         """Accuracy with which the scheme steps: error control raises tolerance and slop to its least values.

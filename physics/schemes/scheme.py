@@ -65,6 +65,8 @@ class Switches:
         Whether bodies can touch each other.
     fixed : True or None
         Whether some bodies are fixed.
+    lone : True or None
+        Whether exactly one body moves, and it can touch fixed bodies.
     grouped : True or None
         Whether collision groups keep some pairs apart that would touch otherwise.
     ellipsoids : True or None
@@ -101,6 +103,7 @@ class Switches:
     integrator: int | None
     meeting: bool
     fixed: bool | None
+    lone: bool | None
     grouped: bool | None
     ellipsoids: bool | None
     hulls: bool | None

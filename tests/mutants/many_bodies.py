@@ -39,6 +39,22 @@ BROADPHASE = [
 
 DATA = [
     _mutant(
+        "data-clipped",
+        "A point where two edges cross is carried along with the incident face.",
+        "data/clipped_points.py",
+        "return times(qt.dot(e, u) / across, d)",
+        "return times(0.0, d)",
+        "kernels/test_clipped_points.py::test_contact_points_move_as_the_next_narrow_phase_finds_them",
+    ),
+    _mutant(
+        "data-lone-corner",
+        "A corner of the reference face is carried along with the incident face.",
+        "data/clipped_points.py",
+        "w = _along_face(edges[0], edges[1], out, u)",
+        "w = (0.0, 0.0, 0.0)",
+        "kernels/test_clipped_points.py::test_contact_points_move_as_the_next_narrow_phase_finds_them",
+    ),
+    _mutant(
         "data-capsule",
         "The contact point of a capsule moves to the axis of the capsule.",
         "data/contact_set.py",
@@ -161,6 +177,30 @@ SOLVER = [
 _CASE = "hard_cases/test_cases.py::test_the_case_comes_out_as_it_must"
 
 STEPPING = [
+    _mutant(
+        "stepping-rim",
+        "A stage of a lone body goes on where its last contact has passed a rim.",
+        "stepping/rim_crossing.py",
+        "return _first_crossing(n, world, h, memory, many)",
+        "return h",
+        "physics/test_fixed.py::test_a_block_slides_off_the_end_of_a_ramp",
+    ),
+    _mutant(
+        "stepping-sudden",
+        "A part of a lone body is accepted without a look at the next part.",
+        "stepping/sudden_change.py",
+        "if many.lone.impacts[0] > 0:",
+        "if many.lone.impacts[0] >= 0:",
+        "physics/test_fixed.py::test_a_block_slides_off_the_end_of_a_ramp_precisely",
+    ),
+    _mutant(
+        "stepping-mean-slip",
+        "Friction of a lone body opposes the slip at the end of a stage where the slip turns.",
+        "stepping/lone_stage.py",
+        "return (t[0], -u[1], -u[2]) if goes_on and is_turning else t",
+        "return t",
+        "physics/test_motion.py::test_a_chip_slides_off_a_turntable",
+    ),
     _mutant(
         "stepping-restitution",
         "A bounce returns all of its speed, whatever its restitution.",

@@ -88,11 +88,12 @@ def shaker() -> tuple[physics.Motion, CubicSpline]:
     return physics.Motion.table(times, pos, repeat=True), CubicSpline(times, x, bc_type="periodic")
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-6), ("precise", 5e-8)])
+@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-5), ("precise", 1e-10)])
 def test_a_block_drifts_on_a_shaker(preset, bound):
     """a ω² = 3 μ g: in each period the block slips both ways; its way after ten periods.
 
-    Twenty slips end, each of them met in time. Otherwise the block would be 5e-3 m off at `balanced`.
+    Twenty slips end, each of them met in time. Otherwise the block would be 5e-3 m off at `balanced`. There rounding
+    decides where a slip counts as ended: 1e-7 to 5e-6 m were seen with different compilers. At `precise` it was 4e-12.
     """
     motion, spline = shaker()
     place, velocity, acceleration = (lambda t, k=k: float(spline(t % PERIOD, k)) for k in range(3))
@@ -125,10 +126,11 @@ def test_a_block_stays_on_a_turntable(preset, bound):
     np.testing.assert_allclose(on_table.angvel[0, :, 1], SPIN, atol=1e-5)
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-3), ("precise", 1e-5)])
+@pytest.mark.parametrize(("preset", "bound"), [("balanced", 2e-5), ("precise", 1e-9)])
 def test_a_chip_slides_off_a_turntable(preset, bound):
-    """Outside μ g/ω² a chip, small enough to be a point, slides outwards. Friction of faces opposes the slip at the end
-    of a step, which is of first order in the turn of the slip.
+    """Outside μ g/ω² a chip, small enough to be a point, slides outwards.
+
+    Friction opposes the mean slip of a step, so that the error is of second order: 9.6e-6 m, and 6e-11 m.
     """
     radius = 1.36 * HOLDING_RADIUS
     start = {"pos": (radius, 0.0005, 0), "linvel": (0, 0, -SPIN * radius), "angvel": (0, SPIN, 0)}

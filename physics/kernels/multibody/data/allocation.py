@@ -22,6 +22,7 @@ from physics.kernels.multibody.data.arrays import (
     NORMAL_ROW_SIZE,
     PAIR_CONTACTS,
     PAIRS_PER_BODY,
+    RATE_SIZE,
     VISIT_SIZE,
     WARM_CONTACT_SIZE,
     WARM_HEADER_SIZE,
@@ -32,6 +33,7 @@ from physics.kernels.multibody.data.arrays import (
     DrivenBodies,
     Islands,
     LinearSystem,
+    LoneBody,
     NarrowPhase,
     Newton,
     PairMaterials,
@@ -131,6 +133,8 @@ def make_bodies_workspace(
         bodies, None: the default rules.
     motion_columns : int
         Columns of a prescribed motion (`flight.prescribed_motion`); 0: no body has one.
+    lone : True or None
+        Whether exactly one body moves, and it can touch fixed bodies.
     settings : float
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
@@ -150,6 +154,7 @@ def make_bodies_workspace(
         walls=walls.copy(),
         materials=materials[1],
         driven=_make_driven(bodies, contacts, motion_columns),
+        lone=_make_lone(contacts) if settings.pop("lone", None) else None,
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )
@@ -306,6 +311,18 @@ def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | Non
     )
 
 
+def _make_lone(contacts: int) -> LoneBody:
+    i = np.int64
+    return LoneBody(
+        follow=np.zeros((contacts, 3)),
+        later=np.zeros((1, 6)),
+        substep=np.zeros(1),
+        impacts=np.zeros(1, i),
+        slow=np.zeros(1, i),
+        suspect=np.zeros(1, i),
+    )
+
+
 def _make_settings(settings: dict[str, float]) -> np.ndarray:
     record = np.zeros(1, np.dtype(bodies_setting_fields()))
     record["residual_limit"] = np.inf
@@ -314,14 +331,17 @@ def _make_settings(settings: dict[str, float]) -> np.ndarray:
     return record
 
 
-def make_snapshots(bodies: int, memory: int) -> WorldSnapshots:
-    """Storage for copies of a world at three moments.
+def make_snapshots(bodies: int, memory: int, lone: bool | None = None) -> WorldSnapshots:
+    """Storage for copies of a world at several moments.
 
     `bodies` is the number of its bodies, `memory` the number of columns of its row of `memory` (`warm_start_size`).
+    `lone` is True if exactly one body moves, among fixed ones, and else None.
     """
+    moments = 4 if lone else 3
     return WorldSnapshots(
-        np.zeros((3, bodies, STATE_SIZE)),
-        np.zeros((3, memory)),
-        np.zeros((3, REPORT_SIZE)),
-        np.zeros((3, bodies), np.int64),
+        np.zeros((moments, bodies, STATE_SIZE)),
+        np.zeros((moments, memory)),
+        np.zeros((moments, REPORT_SIZE)),
+        np.zeros((moments, bodies), np.int64),
+        np.zeros((3, RATE_SIZE)) if lone else None,
     )

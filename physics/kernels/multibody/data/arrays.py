@@ -76,6 +76,10 @@ WARM_CONTACT_ID, WARM_BODY_A, WARM_BODY_B, WARM_IMPULSE, WARM_POINT = 0, 1, 2, 3
 WARM_CONTACT_SIZE = 9
 
 
+# Numbers in a row of `WorldSnapshots.rates`: acceleration [m/s²], rate of the angular momentum [N m].
+RATE_SIZE = 6
+
+
 class WorldSnapshots(NamedTuple):
     """Saved states of a world to which `adaptive_substep` returns; the first axis is the moment of the copy."""
 
@@ -83,6 +87,7 @@ class WorldSnapshots(NamedTuple):
     memory: np.ndarray  # (moments, columns) the world's row of `memory`
     report: np.ndarray  # (moments, REPORT_SIZE) the world's row of the report
     counts: np.ndarray  # (moments, bodies) int, number of events of each body
+    rates: np.ndarray | None  # (3, RATE_SIZE) of `stepping.sudden_change`; None unless exactly one body moves
 
 
 class Bodies(NamedTuple):
@@ -237,6 +242,17 @@ class DrivenBodies(NamedTuple):
     start: StageStart
 
 
+class LoneBody(NamedTuple):
+    """Numbers of the only moving body of a world with fixed bodies."""
+
+    follow: np.ndarray  # (contacts, 3) velocity of the contact point along its edge (`clipped_points`) [m/s]
+    later: np.ndarray  # (1, 6) twist that is foretold for the end of a stage (`stepping.lone_stage`) [m/s, rad/s]
+    substep: np.ndarray  # (1,) length of the substep under error control, else 0 [s]
+    impacts: np.ndarray  # (1,) int, impacts in the present part
+    slow: np.ndarray  # (1,) int, 1: the body is slow in the present stage (`data.lone_body`)
+    suspect: np.ndarray  # (1,) int, place in the substep up to which a sudden change may be (`stepping.lone_part`)
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -251,5 +267,6 @@ class BodiesWorkspace(NamedTuple):
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
     materials: PairMaterials | None  # None: the default rules, and no exceptions
     driven: DrivenBodies | None  # None: the scene declares no motion
+    lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

@@ -12,6 +12,7 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
+from physics.kernels.multibody.data.clipped_points import clear_follow
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -306,6 +307,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
         partner = b
     write_contact_frame(k, normal, many)
     take_driven_velocity(k, many)
+    clear_follow(k, many)
     speed = qt.dot(normal, slip_velocity(k, many))
     slop = pair_slop(a, b, many)
     is_out_of_reach = gap > slop and gap + h * speed - 0.5 * h * h * acceleration > slop

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.clipped_points import follow_vertex
 from physics.kernels.multibody.data.contact_set import add_contact, add_scaled, pair_slop, subtract
 from physics.kernels.multibody.narrowphase.box_clip import (
+    FIRST_SIDE,
     clamp_to_half_width,
     clip_polygon,
     find_rim_edge,
@@ -95,6 +98,30 @@ def _point_above_face(r, x, y, s, t, many):
     return add_scaled(add_scaled(row_vector(many.bodies.center, r, 0), s, x), t, y)
 
 
+@if_given("many.lone")
+def _follow_clipped(before, bodies, place, axes, point, many):
+    """Let the contact that was added last follow its edges (`clipped_points.follow_vertex`).
+
+    `before` is the number of contacts before it, `bodies` are those with the reference and the incident face. Its
+    `point` is vertex k of `count` in copy `source` of `many.narrowphase.polygon`, where `place` is (k, count, source).
+    `axes` are those of the polygon's coordinates. Points are in the world frame [m].
+    """
+    if many.lone.slow[0] == 1:
+        return
+    (k, count, source), (x, y, out) = place, axes
+    p, edge = many.narrowphase.polygon[source], many.narrowphase.edge
+    here, last, following = (
+        row_vector(p, k, 0),
+        row_vector(p, (k + count - 1) % count, 0),
+        row_vector(p, (k + 1) % count, 0),
+    )
+    into, out_of = subtract(here, last), subtract(following, here)
+    one = add_scaled(add_scaled((into[0] * x[0], into[0] * x[1], into[0] * x[2]), into[1], y), into[2], out)
+    other = add_scaled(add_scaled((out_of[0] * x[0], out_of[0] * x[1], out_of[0] * x[2]), out_of[1], y), out_of[2], out)
+    sides = (edge[source, k, 0] >= FIRST_SIDE, edge[source, k, 1] >= FIRST_SIDE)
+    follow_vertex(before, bodies, sides, (one, other), out, point, many)
+
+
 @inlined
 def _add_face_contacts(a, b, face, source, count, least, h, many):
     """Add the contacts between `face` and the clipped face of the other block, given as a polygon.
@@ -131,10 +158,13 @@ def _add_face_contacts(a, b, face, source, count, least, h, many):
         feature = (
             face * _FEATURES_PER_FACE + 8 * many.narrowphase.edge[source, k, 0] + many.narrowphase.edge[source, k, 1]
         )
+        before = many.counts[NUM_CONTACTS]
         if face < 3:
             add_contact(a, b, feature, owner, (-n[0], -n[1], -n[2]), (on_face, on_other), gap, h, many)
         else:
             add_contact(a, b, feature, owner, n, (on_other, on_face), gap, h, many)
+        if first < 0 and count > 2:
+            _follow_clipped(before, (r, o), (k, count, source), (x, y, out), on_other, many)
 
 
 @inlined

@@ -21,6 +21,9 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, subtract
 from physics.kernels.multibody.narrowphase.box_sat import body_axis
 
+# Number of the first edge that is a side of the reference face.
+FIRST_SIDE = 4
+
 
 @inlined
 def _crossing(p, q, axis, bound):

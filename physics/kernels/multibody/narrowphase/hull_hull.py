@@ -14,9 +14,11 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import NUM_CONTACTS
+from physics.kernels.multibody.data.clipped_points import follow_vertex
 from physics.kernels.multibody.data.contact_set import add_contact, add_scaled, pair_slop, subtract
 from physics.kernels.multibody.data.hull_tables import (
     EDGE_END,
@@ -162,6 +164,25 @@ def _clipped_height(which, face, source, count, many):
     return low - many.narrowphase.hulls.offset[which, face]
 
 
+@if_given("many.lone")
+def _follow_clipped(before, bodies, place, out, point, many):
+    """Let the contact that was added last follow its edges (`clipped_points.follow_vertex`).
+
+    `before` is the number of contacts before it, `bodies` are those with the reference and the incident face. Its
+    `point` [m] is vertex k of `count` in copy `source` of `hulls.polygon`, where `place` is (k, count, source). `out`
+    is the normal of the reference face. All vectors are in the world frame.
+    """
+    if many.lone.slow[0] == 1:
+        return
+    k, count, source = place
+    p, sides = many.narrowphase.hulls.polygon[source], many.narrowphase.hulls.sides
+    here = row_vector(p, k, 0)
+    into = subtract(here, row_vector(p, (k + count - 1) % count, 0))
+    out_of = subtract(row_vector(p, (k + 1) % count, 0), here)
+    kinds = (sides[source, k, 0] >= CLIP_SIDE_OFFSET, sides[source, k, 1] >= CLIP_SIDE_OFFSET)
+    follow_vertex(before, bodies, kinds, (into, out_of), out, point, many)
+
+
 @inlined
 def _add_face_contacts(a, b, which, face, source, count, least, h, many):
     """Add the contacts between `face` and the clipped face of the other body, given as a polygon.
@@ -179,10 +200,13 @@ def _add_face_contacts(a, b, which, face, source, count, least, h, many):
         on_face, on_other = add_scaled(p, -height, out), add_scaled(p, lift, out)
         into, out_of = hulls.sides[source, k, 0], hulls.sides[source, k, 1]
         feature = ((which * _MAX_FACES + face) * 2 * CLIP_SIDE_OFFSET + into) * 2 * CLIP_SIDE_OFFSET + out_of
+        before = many.counts[NUM_CONTACTS]
         if which == 0:
             add_contact(a, b, feature, a, (-out[0], -out[1], -out[2]), (on_face, on_other), height + lift, h, many)
         else:
             add_contact(a, b, feature, b, out, (on_other, on_face), height + lift, h, many)
+        if count > 2:
+            _follow_clipped(before, (a, b) if which == 0 else (b, a), (k, count, source), out, on_other, many)
 
 
 @inlined

@@ -19,6 +19,7 @@ from physics.kernels.multibody.data.contact_set import (
 )
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
+from physics.kernels.multibody.stepping.sudden_change import count_impact
 
 # An approach is fast if it would close this share of the smaller body's radius in the time left. The stage then ends at
 # the time of impact; a slower approach is braked within the stage.
@@ -276,6 +277,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
             if k != fastest:
                 many.contacts.target[k, 0] = -_UNCONSTRAINED  # resolved after this impact, when the step returns
     n = drop_unconstrained(n, many)
+    count_impact(many)
     apply_impact_within_energy(n, world, switches.friction, switches.flight.offset_frame, records.report, many)
     if records.log.shape[1] > 0:
         log_impacts(n, world, t, many, records.log, records.counts)

@@ -21,6 +21,7 @@ from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
 from physics.kernels.multibody.data.capsules import is_capsule
+from physics.kernels.multibody.data.clipped_points import follow_edges
 from physics.kernels.multibody.data.contact_set import (
     add_scaled,
     pair_slop,
@@ -47,6 +48,13 @@ from physics.kernels.multibody.stepping.energy_budget import (
     update_twist,
 )
 from physics.kernels.multibody.stepping.impact import FORETOLD
+from physics.kernels.multibody.stepping.lone_stage import (
+    closing_time,
+    exchange_twists,
+    foretell_twist,
+    mean_slip_target,
+    residual_of_lone,
+)
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
@@ -124,6 +132,24 @@ def _turn_of_line(a, b, many):
 
 
 @inlined
+def _turning(k, a, b, h, many):
+    """Velocity that contact k loses until the end of a stage of length h [s] by turning, in the contact frame [m/s].
+
+    Its points turn with their bodies a and b; the normal turns, too. The second end b is that of `moving_body_at`.
+    """
+    half = 0.5 * h
+    c = _centripetal(a, k, 0, -1.0, h, many)
+    if b >= 0:
+        c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
+    t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
+    t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
+    t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
+    if many.settings[0].is_error_controlled == 1 or has_fixed(many):
+        t = (t[0] + h * _coriolis(k, many), t[1], t[2])
+    return t
+
+
+@inlined
 def set_resting_targets(n, h, many):
     """Set the target velocities of the n contacts in a resting stage of length h [s], with gaps at its middle.
 
@@ -131,29 +157,26 @@ def set_resting_targets(n, h, many):
     of it, measured at the middle, in the second half of the stage. Under error control, the gap that a point gains only
     by its motion on a circle is left out: it would cause an error of first order in the velocity.
     """
-    half = 0.5 * h
+    half, long = 0.5 * h, closing_time(h, many)
     for k in range(n):
         a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
         slop = pair_slop(a, b, many)
-        c = _centripetal(a, k, 0, -1.0, h, many)
-        if b >= 0:
-            c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
-        t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-        t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
-        t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
+        exchange_twists(a, many)
+        t = _turning(k, a, b, h, many)
+        exchange_twists(a, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many):
-            t = (t[0] + h * _coriolis(k, many), t[1], t[2])
             gap += 0.5 * half * t[0]
-        t = clamp_target_to_energy(t, qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many)))
+        u = qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many))
+        t = mean_slip_target(k, clamp_target_to_energy(t, u), u, many)
         if many.contacts.target[k, 0] == FORETOLD:
             t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
         elif gap > slop:
             t = (t[0] - (gap + parted_slack(k, many)) / half, t[1], t[2])
         elif gap > 0.0:
-            t = (t[0] - GAP_CLOSING_SHARE * gap / h, t[1], t[2])
+            t = (t[0] - GAP_CLOSING_SHARE * gap / long, t[1], t[2])
         negligible = max(
-            many.settings[0].tolerance * relative_acceleration_bound(k, many) * h, NEGLIGIBLE_SLOP_SHARE * slop / h
+            many.settings[0].tolerance * relative_acceleration_bound(k, many) * h, NEGLIGIBLE_SLOP_SHARE * slop / long
         )
         if max(abs(t[0]), max(abs(t[1]), abs(t[2]))) <= negligible:
             t = (0.0, 0.0, 0.0)
@@ -192,7 +215,7 @@ def rest_residual(h, many):
             and many.settings[0].tolerance * many.bodies.body[b].acceleration * h > slop_speed
         ):
             least = min(least, CREEP_SLOP_SHARE * slop_speed)
-    return least
+    return min(least, residual_of_lone(many))
 
 
 @inlined
@@ -234,7 +257,9 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
         kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
     update_contacts(many)
+    follow_edges(n, half, many)
     take_later_velocities(n, half, many)
+    foretell_twist(n, world, h, switches, records.memory, many)
     set_resting_targets(n, h, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:

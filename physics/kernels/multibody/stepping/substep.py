@@ -32,16 +32,19 @@ from physics.kernels.multibody.data.contact_set import smaller_radius
 from physics.kernels.multibody.data.driven_bodies import bind_driven_twists
 from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
+from physics.kernels.multibody.data.lone_body import note_slowness
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.stepping.conservative_advancement import (
     clear_spin_bounds,
     safe_stage_length,
     write_spin_bounds,
 )
+from physics.kernels.multibody.stepping.constraint_projection import project_constraints
 from physics.kernels.multibody.stepping.impact import resolve_impacts
 from physics.kernels.multibody.stepping.midpoint_step import hold_all_loads
 from physics.kernels.multibody.stepping.passing_pairs import redirect_passing_pairs
 from physics.kernels.multibody.stepping.position_correction import correct_positions
+from physics.kernels.multibody.stepping.rim_crossing import stage_to_rim
 from physics.kernels.multibody.stepping.slip_end import step_to_slip_end
 from physics.kernels.state import layout as at
 from physics.kernels.state.groups import flies_exactly
@@ -98,6 +101,7 @@ def substep_world(
         hold_all_loads(left, switches.flight.gyroscopic, switches.flight.offset_frame, many)
         update_poses_and_twists(switches.flight.offset_frame, many)
         bind_driven_twists(start + (h - left), left, many)
+        note_slowness(left, many)
         is_turning = write_spin_bounds(h, switches.flight.offset_frame, many)
         if is_turning and (is_last or turns >= MAX_TURNING_CUTS):
             clear_spin_bounds(many)
@@ -130,11 +134,14 @@ def substep_world(
             cuts += 1
         if t < left:
             records.report[world, at.SPLITS] += 1.0
+        t = stage_to_rim(n, world, t, is_last, records.memory, many)
         t = step_to_slip_end(n, world, start + (h - left), t, is_last, switches, sleep, records, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.body[b])
         if n > 0:
+            project_constraints(world, t, switches, records.memory, many)
+            n = many.counts[NUM_CONTACTS]
             correct_positions(n, switches.flight.offset_frame, many)
         if is_last or not left > 0.0:
             break
