@@ -23,6 +23,7 @@ from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, S
 from physics.scene.force_field import Field, FieldSlot, field_slots
 from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import find_materials, has_restitution
+from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
 
 # Moments of inertia that differ by less than this share are equal to rounding; their gyroscopic torque would be noise.
@@ -59,7 +60,7 @@ class Needs:
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
-        Shapes of the bodies, such as ``block``.
+        Shapes of the bodies, such as ``block``, and of the parts of compounds.
     features : int
         Features with which a body may touch a wall: the 8 vertices of a block if the scene has blocks, else 1.
     isotropic : bool
@@ -114,6 +115,11 @@ class Needs:
         """True if capsules can touch walls or other bodies."""
         return self.touching and "capsule" in self.kinds
 
+    @property
+    def compounds(self) -> bool:
+        """True if compounds can touch walls or other bodies."""
+        return self.touching and "compound" in self.kinds
+
 
 def is_isotropic(moments: np.ndarray) -> Any:
     """True (...) where the three `moments` (..., 3) of a body are equal to rounding: it needs no gyroscopic torque."""
@@ -128,7 +134,7 @@ def is_tilted(R: np.ndarray) -> Any:
 def find_needs(scene: Scene) -> Needs:
     """Find the effects that can act in a scene."""
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
-    kinds = frozenset(body.kind for body in scene.bodies)
+    kinds = frozenset(body.kind for body in with_parts(scene.bodies))
     fixed = any(body.fixed for body in scene.bodies)
     meeting, at_walls, grouped = _meetings(scene, contact, fixed)
     touching = at_walls or meeting
@@ -175,7 +181,7 @@ def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool,
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
-    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in scene.bodies)
+    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in with_parts(scene.bodies))
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,
         LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,

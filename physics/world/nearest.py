@@ -12,8 +12,8 @@ from physics.html_table import parts_table
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.queries.nearest_queries import Found
 from physics.kernels.state.layout import SPHERE
-from physics.plan.plan import SHAPE_CODES
 from physics.scene.bodies import Body
+from physics.scene.parts import SHAPE_CODES
 from physics.summary import parts_repr, shown
 from physics.world.query_arguments import result
 from physics.world.query_calls import CAPSULE

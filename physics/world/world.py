@@ -19,11 +19,12 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import BoundCall
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
-from physics.plan.plan import SHAPE_CODES, make_plan
+from physics.plan.plan import make_plan
 from physics.scene.body_names import body_names
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.motion import Motion
+from physics.scene.parts import SHAPE_CODES
 from physics.scene.scene import Scene
 from physics.summary import counted
 from physics.undo import undo_on_error
