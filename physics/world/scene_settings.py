@@ -7,8 +7,6 @@ from dataclasses import replace
 from typing import Any
 from zlib import crc32
 
-import numpy as np
-
 from physics.scene.effects import Actuator, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK
@@ -56,7 +54,7 @@ def _placed(placed) -> bytes:
     """Bytes of the shape of a compound's part: its kind, pose, dimensions, and the corners of a hull."""
     part = placed.part
     shape = part.polyhedron.vertices if part.kind == "hull" else part.dimensions
-    return part.kind.encode() + b"".join(np.ascontiguousarray(each).tobytes() for each in (placed.place, placed.R, shape))
+    return part.kind.encode() + b"".join(each.tobytes() for each in (placed.place, placed.R, shape))
 
 
 def _wall(wall: HalfSpace) -> str:

@@ -144,7 +144,7 @@ def make_bodies_workspace(
     made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules, parts)
     acting = ActingBodies(made.body[:bodies], made.state, made.touched, made.fixed)
     return BodiesWorkspace(
-        bodies=made._replace(parts=make_parts(acting, parts, contacts)),
+        bodies=made._replace(parts=make_parts(bodies, parts, contacts, acting)),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),

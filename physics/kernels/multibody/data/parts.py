@@ -38,7 +38,7 @@ class Parts(NamedTuple):
     place: np.ndarray  # (parts, 3) geometric centre from the body's centre of mass, body frame [m]
     turn: np.ndarray  # (parts, 9) rotation matrix from the part's frame to the body frame, row by row
     touching: np.ndarray  # (contacts, 2) int, parts of both ends; -1 - k for wall k
-    acting: ActingBodies
+    acting: ActingBodies | None  # None in the scratch of queries
 
 
 class Part(NamedTuple):
@@ -52,12 +52,16 @@ class Part(NamedTuple):
     turn: np.ndarray  # (3, 3) rotation from the part's frame to the body frame
 
 
-def make_parts(acting: ActingBodies, parts: Sequence[Part], contacts: int) -> Parts | None:
-    """Make the table of the parts of a world's bodies, sorted by their bodies; None if there are no parts."""
+def make_parts(
+    bodies: int, parts: Sequence[Part], contacts: int = 0, acting: ActingBodies | None = None
+) -> Parts | None:
+    """Make the table of the parts of a world with so many bodies, sorted by their bodies; None if there are no parts.
+
+    It has room for so many `contacts`.
+    """
     if not parts:
         return None
-    bodies, i = len(acting.state), np.int64
-    count = bodies + len(parts)
+    count, i = bodies + len(parts), np.int64
     table = Parts(
         np.arange(count, dtype=i), np.stack((np.arange(bodies), np.arange(bodies) + 1), axis=1).astype(i),
         np.zeros((count, 3)), np.tile(np.eye(3).ravel(), (count, 1)), np.zeros((contacts, 2), i),
