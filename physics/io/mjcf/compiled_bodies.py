@@ -217,7 +217,7 @@ def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> lis
     geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
     able = [g for g in geoms if touching.may_touch(g)]
     if not geoms:
-        raise model.error("body", root, "has no geom, with all that is fixed to it; allowed is 1 or more")
+        raise model.error("body", root, "has 0 geoms, with all that is fixed to it; allowed is 1 or more")
     for geom in able:
         if not touching.are_alike(able[0], geom):
             raise model.error("geom", geom, "differs in contact from another geom of its body; allowed are geoms alike")

@@ -336,7 +336,7 @@ def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray
     """Find the only geom of a body element that has at most one: the geom, its kind, its half axes or points [m]."""
     geoms = element.findall("geom")
     if len(geoms) != 1:
-        raise _unread(element, "has no geom; allowed is one or more")
+        raise _unread(element, "has 0 geoms; allowed is one or more")
     geom, kind = geoms[0], _type(geoms[0])
     if kind not in SHAPES:
         raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
