@@ -93,7 +93,11 @@ def test_the_rest_is_read_and_what_was_left_out_is_listed():
     assert scene.walls == (physics.HalfSpace((0, 0, 1), name="f", friction=0.5),)
     assert [body.friction for body in scene.bodies] == [0.5, 1.0]
     assert scene.effect(physics.Friction) == physics.Friction(1.0, rule="maximum")
-    told = ["line 2: <option> has a medium", "line 6: <geom> of <body> differs", "line 4: <geom 't'> is a fixed cylinder"]
+    told = [
+        "line 2: <option> has a medium",
+        "line 6: <geom> of <body> differs",
+        "line 4: <geom 't'> is a fixed cylinder",
+    ]
     assert [message.startswith(start) for message, start in zip(left, told)] == [True] * 3
     assert len(left) == 3
 

@@ -1,0 +1,350 @@
+"""Compounds: mass, flight, the same motion as one convex body, rest, collisions, queries, and what they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import physics
+from tests.reference import rigid_body as ref
+from tests.reference.compounds import mass_properties, taken_apart
+from tests.tiers.sweep import sweep
+
+pytestmark = pytest.mark.interpreted
+
+G = 9.81
+FLOOR = physics.HalfSpace((0, 1, 0))
+PULL = physics.Gravity((0, -G, 0))
+WEDGE = np.array([(0, 0, 0), (1, 0, 0), (0, 0.8, 0), (0, 0, 0.9), (1, 0, 0.9), (0, 0.8, 0.9)])
+
+# The solver's tolerance, as a share of the speeds, is then far below the bounds of these tests.
+EXACT = physics.Accuracy(tolerance=1e-12)
+
+
+def effects(mu: float = 0.5, restitution: float | None = None) -> list:
+    return [PULL, physics.Contact(restitution=restitution), physics.Friction(mu)]
+
+
+def world_of(*bodies, walls=(FLOOR,), laws=None, dt=0.01, accuracy=EXACT):
+    return physics.World(physics.Scene(bodies, walls, effects() if laws is None else laws), dt=dt, accuracy=accuracy)
+
+
+def turned(rng) -> np.ndarray:
+    q = rng.normal(size=4)
+    return q / np.linalg.norm(q)
+
+
+def each_shape(rng) -> list[physics.Body]:
+    """A part of each shape, in drawn poses."""
+    shapes = (
+        physics.Block((1.0, 0.4, 0.3), 1.0), physics.Sphere(0.3, 2.0), physics.Ellipsoid((0.3, 0.2, 0.5), 0.7),
+        physics.Capsule(0.1, 0.7, 0.4), physics.Hull(rng.normal(size=(8, 3)) * 0.3, 1.5),
+    )  # fmt: skip
+    return [type(s)(**{**vars(s), "pos": rng.uniform(-0.6, 0.6, 3), "quat": turned(rng)}) for s in shapes]
+
+
+def dumbbell(**given) -> physics.Compound:
+    """Two different balls on a rod along x."""
+    rod = physics.Capsule(0.05, 0.8, 0.2, quat=(0.5**0.5, 0, 0, 0.5**0.5))
+    balls = physics.Sphere(0.25, 1.0, pos=(-0.4, 0, 0)), physics.Sphere(0.2, 1.5, pos=(0.4, 0, 0))
+    return physics.Compound([*balls, rod], **given)
+
+
+def table(**given) -> physics.Compound:
+    """A top of 5 kg at y from 0 to 0.1 m, and four legs of 1 kg and 0.8 m below it."""
+    legs = [physics.Block((0.1, 0.8, 0.1), 1.0, pos=(x, -0.4, z)) for x in (-0.9, 0.9) for z in (-0.5, 0.5)]
+    return physics.Compound([physics.Block((2.0, 0.1, 1.2), 5.0, pos=(0, 0.05, 0)), *legs], **given)
+
+
+def halves(**given) -> physics.Compound:
+    """The block of 5 x 3 x 2 m and 6 kg, glued of two."""
+    return physics.Compound([physics.Block((2.5, 3, 2), 3.0, pos=(x, 7, 7)) for x in (-1.25, 1.25)], **given)
+
+
+# --- mass ------------------------------------------------------------------------------------------------------------
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_mass_centre_and_inertia_are_those_of_a_quadrature(seed):
+    """The rules are exact for the second moments of every part, so that rounding of sums is left."""
+    compound = physics.Compound(each_shape(np.random.default_rng(seed)))
+    mass, centre, inertia = mass_properties(compound)
+    assert compound.mass == pytest.approx(mass, rel=1e-13)
+    np.testing.assert_allclose(compound.centroid, centre, atol=1e-13)
+    np.testing.assert_allclose(compound.inertia, inertia, atol=1e-12 * np.abs(inertia).max())
+
+
+@pytest.mark.parametrize("compound", [dumbbell(), table()], ids=["dumbbell", "table"])
+def test_inertia_of_a_dumbbell_and_a_table(compound):
+    mass, centre, inertia = mass_properties(compound)
+    np.testing.assert_allclose(compound.inertia, inertia, rtol=0, atol=1e-12 * inertia.max())
+    np.testing.assert_allclose(compound.centroid, centre, rtol=0, atol=1e-12)
+    assert physics.Compound(compound.parts, 2 * mass).inertia == pytest.approx(2 * inertia, rel=1e-12)
+
+
+def test_radius_and_half_extents_hold_all_points():
+    compound = physics.Compound(each_shape(np.random.default_rng(3)), quat=(1, 0, 0, 0))
+    apart = taken_apart(compound)
+    world = world_of(*apart, walls=[], laws=[])
+    points = world.nearest_to(None, 100.0 * np.random.default_rng(4).normal(size=(200, 3))).other_point[0]
+    assert (np.abs(points) <= compound.dimensions + 1e-12).all()
+    assert np.linalg.norm(points, axis=1).max() <= compound.bounding_radius(compound.dimensions) + 1e-12
+
+
+def test_a_dumbbell_in_flight_agrees_with_the_equations_of_motion():
+    """DOP853 with rtol 1e-13; the exact flow of free rotation adds rounding of some hundred steps."""
+    body = dumbbell(pos=(0, 5, 0), quat=(0.5, 0.5, -0.5, 0.5), linvel=(1, 2, 3), angvel=(0.4, 1.5, -0.7))
+    world = physics.World(physics.Scene([body], effects=[PULL]), dt=0.01)
+    world.step(steps=100)
+    R = ref.rotation_matrix(np.array(body.quat))
+    spin = R @ body.inertia @ R.T @ body.angvel
+    start = ref.RigidState(np.array(body.pos), np.array(body.quat), body.mass * np.array(body.linvel), spin)
+    end = ref.integrate_rigid_body(body.mass, body.inertia, start, 1.0, gravity=(0, -G, 0))
+    np.testing.assert_allclose(world.pos[0, 0], end.pos, rtol=1e-12)
+    assert ref.orientation_error(world.quat[0, 0], end.quat) < 1e-12
+
+
+# --- the same motion as one convex body ------------------------------------------------------------------------------
+
+ALONE = {
+    "block": physics.Block((1, 0.6, 0.4), 2.0), "sphere": physics.Sphere(0.4, 2.0), "hull": physics.Hull(WEDGE, 2.0),
+    "ellipsoid": physics.Ellipsoid((0.5, 0.3, 0.2), 2.0), "capsule": physics.Capsule(0.2, 0.6, 2.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", sweep(ALONE, ["block"]))
+def test_a_compound_of_one_part_moves_as_that_part_bit_for_bit(kind):
+    """Products with the identity are exact, and so are sums with zero; a second body brings both to one scheme."""
+    start = {"pos": (0.1, 0.9, 0), "quat": (0.8, 0.6, 0, 0), "linvel": (1, -2, 0.5), "angvel": (1, 2, -3)}
+    alone = type(ALONE[kind])(**{**vars(ALONE[kind]), **start})
+    other = physics.Block((3, 0.4, 3), fixed=True, pos=(0.3, 0.2, 0.1))
+    single = world_of(alone, other, accuracy="balanced")
+    whole = world_of(physics.Compound([ALONE[kind]], **start), other, accuracy="balanced")
+    for world in (single, whole):
+        world.step(steps=60 if kind == "block" else 100)
+    assert single.report.ok
+    np.testing.assert_array_equal(single.state, whole.state)
+
+
+SLIDE = {"linvel": (1.0, 0, 0.3)}
+
+
+@pytest.mark.parametrize("support", sweep(["floor", "table"], ["table"]))
+def test_two_glued_halves_fall_slide_and_rest_as_one_block(support):
+    """All points slip alike, so that the motion does not depend on how the points share the load.
+
+    At the tolerance 1e-12 solves are off by 1e-12 of g h a step; at `balanced` they would be off by 1e-6 of it.
+    """
+    ground = {} if support == "floor" else {"walls": ()}
+    others = [] if support == "floor" else [physics.Block((40, 1, 40), fixed=True, pos=(0, -0.5, 0))]
+    block = world_of(physics.Block((5, 3, 2), 6.0, pos=(0, 1.6, 0), **SLIDE), *others, **ground)
+    glued = world_of(halves(pos=(0, 1.6, 0), **SLIDE), *others, **ground)
+    for _ in range(2):
+        block.step(steps=20)
+        glued.step(steps=20)
+        np.testing.assert_allclose(glued.pos[0, 0], block.pos[0, 0], rtol=0, atol=1e-11)
+        np.testing.assert_allclose(glued.quat[0, 0], block.quat[0, 0], rtol=0, atol=1e-11)
+    assert np.abs(glued.linvel).max() < 1e-9  # it rests
+
+
+@pytest.mark.exhaustive
+def test_a_hull_glued_of_two_falls_slides_and_rests_as_one_hull():
+    """A wedge that a plane cuts into two, which lies on its face y = 0; its points are turned by 0.3 rad about y."""
+    c, s = np.cos(0.3), np.sin(0.3)
+    points = WEDGE @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    cut = points[[1, 4]] * 0.5 + points[[0, 3]] * 0.5  # middles of the edges along x
+    left = physics.Hull([*points[[0, 3, 2, 5]], *cut], density=1.0)
+    right = physics.Hull([*points[[1, 4, 2, 5]], *cut], density=1.0)
+    whole = physics.Hull(points, left.mass + right.mass)
+    parts = [type(half)(half.points, half.mass, pos=half.centroid) for half in (left, right)]
+    floor = physics.Block((40, 1, 40), fixed=True, pos=(0, -0.5, 0))
+    height = -whole.polyhedron.vertices[:, 1].min()
+    start = {"pos": (0, height + 0.1, 0), **SLIDE}
+    one = world_of(physics.Hull(points, whole.mass, **start), floor, walls=())
+    two = world_of(physics.Compound(parts, **start), floor, walls=())
+    for world in (one, two):
+        world.step(steps=60)
+    np.testing.assert_allclose(two.pos, one.pos, rtol=0, atol=1e-10)
+    assert np.abs(two.linvel).max() < 1e-9
+
+
+def tiles(count: int) -> physics.Compound:
+    """A fixed plate of square tiles whose top is y = 0."""
+    parts = [physics.Block((2, 1, 8), fixed=True, pos=(2.0 * k, -0.5, 0)) for k in range(count)]
+    return physics.Compound(parts, fixed=True, pos=(count - 1.0, -0.5, 0))
+
+
+@pytest.mark.parametrize("body", sweep(["ball", "block"], ["ball"]))
+def test_seams_between_parts_stop_nothing(body):
+    """A ball rolls, and a block slides to its rest, over seams of a compound as over one block."""
+    plate = physics.Block((20, 1, 8), fixed=True, pos=(9, -0.5, 0))
+    ball = physics.Sphere(0.3, 1.0, pos=(0.1, 0.3, 0), linvel=(3, 0, 0.2), angvel=(0.2 / 0.3, 0, -10))
+    block = physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.15, 0), linvel=(3, 0, 0.2))
+    ends = []
+    for support in (plate, tiles(10)):
+        world = world_of(ball if body == "ball" else block, support, walls=())
+        world.step(steps=60)
+        ends.append(world.pos[0, 0].copy())
+    assert ends[0][0] > 1.01  # past a seam
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-10)
+
+
+# --- rest and collisions ---------------------------------------------------------------------------------------------
+
+
+def test_a_table_rests_on_four_legs_over_a_ball_that_rolls():
+    """Forces of the legs add up to the weight, and about each axis their torques vanish; the ball rolls straight."""
+    r = 0.2
+    stand = table(pos=np.add(table().centroid, (0, 0.8, 0)))
+    ball = physics.Sphere(r, 1.0, pos=(-0.4, r, 0.1), linvel=(1, 0, 0), angvel=(0, 0, -1 / r))
+    world = world_of(stand, ball)
+    world.step(steps=30)
+    np.testing.assert_allclose(world.pos[0, 0], stand.pos, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(world.pos[0, 1], (-0.1, r, 0.1), rtol=0, atol=1e-9)
+    contacts = world.read_contacts()
+    of_table = contacts.ends[0, : contacts.count[0], 0] == 0
+    points, forces = (array[0, : contacts.count[0]][of_table] for array in (contacts.point, contacts.force))
+    assert len(points) == 16
+    np.testing.assert_allclose(forces.sum(axis=0), (0, stand.mass * G, 0), atol=1e-8)
+    np.testing.assert_allclose(np.cross(points - stand.pos, forces).sum(axis=0), 0, atol=1e-8)
+
+
+def test_a_ball_under_a_fixed_table_hits_its_leg():
+    """It comes back as from a wall: the leg is 0.05 m of half width at x = 0.9 m, and the restitution is 1."""
+    stand = table(pos=np.add(table().centroid, (0, 0.8, 0)), fixed=True)
+    ball = physics.Sphere(0.2, 1.0, pos=(0.3, 0.2, 0.5), linvel=(1, 0, 0))
+    world = world_of(stand, ball, laws=[physics.Contact(restitution=1.0)])
+    world.step(steps=50)
+    np.testing.assert_allclose(world.linvel[0, 1], (-1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(world.pos[0, 1], (2 * 0.65 - 0.8, 0.2, 0.5), atol=1e-8)
+    np.testing.assert_array_equal(world.pos[0, 0], stand.pos)
+
+
+def totals(world):
+    """Momentum, angular momentum about the origin and kinetic energy of all bodies together."""
+    found = physics.diagnose(world)
+    spin = found.angular_momentum + np.cross(world.pos, found.momentum)
+    return found.momentum.sum(axis=1)[0], spin.sum(axis=1)[0], float(found.kinetic_energy.sum())
+
+
+@pytest.mark.parametrize("restitution", sweep([1.0, 0.5, None], [1.0]))
+def test_two_dumbbells_keep_their_momenta_when_they_collide(restitution):
+    """No force from outside acts; without friction and with restitution 1 the energy stays, too."""
+    one = dumbbell(pos=(-0.6, 0.1, 0), linvel=(2, 0, 0), angvel=(0, 0, 3), quat=(0.9, 0.1, 0.3, 0.3))
+    other = dumbbell(pos=(0.6, 0, 0.1), linvel=(-1, 0, 0), angvel=(1, 2, 0))
+    world = world_of(one, other, walls=(), laws=[physics.Contact(restitution=restitution)])
+    p, L, energy = totals(world)
+    world.step(steps=40)
+    p_new, L_new, energy_new = totals(world)
+    assert np.abs(world.linvel[0, 0] - one.linvel).max() > 0.3  # they have met
+    np.testing.assert_allclose(p_new, p, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(L_new, L, rtol=0, atol=1e-11)
+    if restitution == 1.0:
+        assert energy_new == pytest.approx(energy, rel=1e-9)
+    else:
+        assert energy_new < energy
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("preset", ["fast", "balanced", "precise"])
+def test_compounds_of_all_shapes_come_to_rest_in_a_heap(preset):
+    """Nothing is left out, nothing gains energy, and what lies on the floor is carried by it."""
+    rng = np.random.default_rng(5)
+    drops = [physics.Compound(each_shape(rng), pos=(0.3 * k, 1.2 + 1.6 * k, 0), quat=turned(rng)) for k in range(3)]
+    world = world_of(*drops, table(pos=(4, 2, 0), angvel=(1, 0, 2)), accuracy=preset)
+    energy = np.inf
+    for _ in range(60):
+        report = world.step(steps=5)
+        now = float(physics.diagnose(world).energy.sum())
+        assert report.contacts_left_out == 0
+        assert now <= energy + 1e-3
+        energy = now
+    weight = G * sum(body.mass for body in world.scene.bodies)
+    assert world.contact_forces()[0].sum(axis=0)[1] == pytest.approx(weight, rel=0.05)
+
+
+def test_groups_and_coefficients_are_those_of_the_whole():
+    """A compound without a common group falls through another; a wall of friction 0 lets one of friction 0.9 slide."""
+    shelf = physics.Compound([physics.Block((4, 0.2, 4), fixed=True)], fixed=True, pos=(0, 1, 0), group=2, mask=1)
+    falling = dumbbell(pos=(0, 1.5, 0), mask=4, group=1)
+    world = world_of(shelf, falling, walls=())
+    world.step(steps=30)
+    assert world.pos[0, 1, 1] == pytest.approx(1.5 - 0.5 * G * 0.3**2, abs=1e-12)
+
+
+# --- queries ---------------------------------------------------------------------------------------------------------
+
+
+def test_queries_ask_every_part():
+    """Rays and gaps are those of the parts as bodies of their own, to rounding of poses."""
+    rng = np.random.default_rng(7)
+    compound = physics.Compound(each_shape(rng), pos=(1, 2, 3), quat=turned(rng))
+    ball = physics.Sphere(0.2, 1.0, pos=(3, 2, 3))
+    whole = world_of(ball, compound, laws=[physics.Contact()])
+    apart = world_of(ball, *taken_apart(compound), laws=[physics.Contact(between_bodies=False)])
+    origins = rng.normal(size=(100, 3)) * 3 + compound.pos
+    ways = rng.normal(size=(100, 3)) * 0.6 + compound.pos - origins
+    found, expected = whole.cast_rays(origins, ways), apart.cast_rays(origins, ways)
+    assert (np.minimum(expected.hit, 1) == found.hit).all()
+    assert (found.hit == 1).sum() > 30
+    np.testing.assert_allclose(found.distance, expected.distance, atol=1e-12)
+    np.testing.assert_allclose(found.normal, expected.normal, atol=1e-10)
+    parts = range(1, len(compound.parts) + 1)
+    for other in (0, -1):
+        gap = whole.measure_distances([1], [other]).gap[0, 0]
+        assert gap == pytest.approx(
+            min(apart.measure_distances([part], [other]).gap[0, 0] for part in parts), abs=1e-12
+        )
+    cube = physics.Block((0.2, 0.3, 0.4), 1.0)
+    near, single = (world.nearest_to(cube, origins, (1, 0, 0, 0)) for world in (whole, apart))
+    np.testing.assert_allclose(near.gap, single.gap, atol=1e-12)
+    assert (near.other == np.minimum(single.other, 1)).all()
+
+
+def test_a_compound_starts_over_a_floor_by_its_lowest_part():
+    with pytest.raises(ValueError, match=r"0\.\d+ m inside walls\[0\]"):
+        world_of(table(pos=(0, 0.4, 0)))
+    world_of(table(pos=np.add(table().centroid, (0, 0.8, 0))))
+
+
+# --- refusals --------------------------------------------------------------------------------------------------------
+
+
+REFUSED = {
+    "no parts": (lambda: physics.Compound([]), "parts is empty"),
+    "a body": (lambda: physics.Compound(physics.Sphere(1.0, 1.0)), "parts is Sphere"),
+    "a compound": (lambda: physics.Compound([dumbbell()]), r"parts\[0\] is Compound"),
+    "a velocity": (lambda: physics.Compound([physics.Sphere(1.0, 1.0, linvel=(1, 0, 0))]), r"parts\[0\]\.linvel"),
+    "a name": (lambda: physics.Compound([physics.Sphere(1.0, 1.0, name="ball")]), r"parts\[0\]\.name"),
+    "friction": (lambda: physics.Compound([physics.Sphere(1.0, 1.0, friction=0.3)]), r"parts\[0\]\.friction"),
+    "a fixed part": (lambda: physics.Compound([physics.Sphere(1.0, fixed=True)]), r"parts\[0\]\.fixed is True"),
+    "density": (lambda: physics.Compound(dumbbell().parts, density=2.0), "density is 2.0 of a Compound"),
+    "drag": (lambda: physics.Scene([dumbbell()], effects=[physics.Drag()]), r"Drag, and Scene.bodies\[0\] is a compo"),
+    "rolling friction": (
+        lambda: world_of(dumbbell(pos=(0, 1, 0)), laws=[*effects(), physics.RollingFriction(0.1)]),
+        "RollingFriction",
+    ),
+    "size": (
+        lambda: world_of(dumbbell(pos=(0, 1, 0))).set_parameters(size=(1, 1, 1)),
+        r"Scene.bodies\[0\], a compound, which has its parts in all worlds",
+    ),
+    "probe": (lambda: world_of(dumbbell(pos=(0, 1, 0))).nearest_to(dumbbell(), (0, 0, 0)), "allowed are convex shapes"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_what_is_not_supported_is_named(name):
+    make, message = REFUSED[name]
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_masses_of_worlds_scale_the_inertia():
+    world = world_of(dumbbell(pos=(0, 1, 0)))
+    world.set_parameters(mass=5.4)
+    start = {"angvel": (0, 3.0, 0)}
+    world.set_state(**start)
+    spin = physics.diagnose(world).angular_momentum
+    np.testing.assert_allclose(np.ravel(spin)[1], 2 * dumbbell().inertia[1, 1] * 3.0, rtol=1e-12)
