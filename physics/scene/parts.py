@@ -9,8 +9,14 @@ from physics.kernels.state.layout import BLOCK, CAPSULE, COMPOUND, ELLIPSOID, HU
 from physics.scene.bodies import Body
 from physics.scene.compound import Compound
 
-SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL, "capsule": CAPSULE}
-SHAPE_CODES["compound"] = COMPOUND
+SHAPE_CODES = {
+    "block": BLOCK,
+    "sphere": SPHERE,
+    "ellipsoid": ELLIPSOID,
+    "hull": HULL,
+    "capsule": CAPSULE,
+    "compound": COMPOUND,
+}
 
 
 def with_parts(bodies: Iterable[Body]) -> tuple[Body, ...]:
