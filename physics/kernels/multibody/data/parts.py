@@ -247,7 +247,11 @@ def place_parts(b, many):
             many.bodies.rotation[part, c] = S[c]
 
 
-@if_given("many.bodies.parts")
+def _no_parts(many):
+    return None
+
+
+@if_given("many.bodies.parts", _no_parts)
 def bind_parts(many):
     """Give every part the slop of its body."""
     for part in range(many.bodies.state.shape[0], many.bodies.body.shape[0]):
