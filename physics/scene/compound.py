@@ -119,6 +119,7 @@ class Compound(Body):
             linvel: ArrayLike = ...,
             angvel: ArrayLike = ...,
             inertia_body: ArrayLike | None = None,
+            density: None = None,
             name: str | None = None,
             friction: float | None = None,
             restitution: float | None = None,

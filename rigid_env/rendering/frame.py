@@ -77,6 +77,7 @@ class BodyView:
         _set_array(self, "corners", (-1, 3))
         if (self.kind == "hull") != bool(self.faces):
             raise ValueError(f"faces must be those of a hull, and of nothing else, not {self.faces!r} of a {self.kind}")
+        object.__setattr__(self, "parts", tuple(self.parts))
         if (self.kind == "compound") != bool(self.parts):
             raise ValueError(f"a compound alone must have parts, not {len(self.parts)} of a {self.kind}")
         if not (self.dimensions > 0.0).all():
