@@ -55,6 +55,22 @@ DATA = [
         "physics/test_compounds.py::test_queries_ask_every_part",
     ),
     _mutant(
+        "data-covered-seam",
+        "A seam between two parts is an edge of the whole.",
+        "narrowphase/covered_points.py",
+        "found < (1.0 - _NEARER_SHARE) * height",
+        "found < -height",
+        "physics/test_compounds.py::test_seams_between_parts_stop_nothing",
+    ),
+    _mutant(
+        "data-covered-corner",
+        "A face that ends at another part in a concave corner is not touched there.",
+        "narrowphase/covered_points.py",
+        "< 1.0 - _SAME_NORMAL",
+        "< 2.0",
+        "physics/test_compounds.py::test_an_edge_stands_in_the_bottom_of_a_valley",
+    ),
+    _mutant(
         "data-part-anchor",
         "The contact point of a round part moves to where the body's centre of mass would have it.",
         "data/contact_set.py",

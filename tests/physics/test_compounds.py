@@ -180,19 +180,105 @@ def tiles(count: int) -> physics.Compound:
     return physics.Compound(parts, fixed=True, pos=(count - 1.0, -0.5, 0))
 
 
-@pytest.mark.parametrize("body", sweep(["ball", "block"], ["ball"]))
-def test_seams_between_parts_stop_nothing(body):
-    """A ball rolls, and a block slides to its rest, over seams of a compound as over one block."""
+OVER_SEAMS = {
+    "ball": physics.Sphere(0.3, 1.0, pos=(0.1, 0.3, 0), linvel=(3, 0, 0.2), angvel=(0.2 / 0.3, 0, -10)),
+    "bouncing ball": physics.Sphere(0.3, 1.0, pos=(0.3, 0.9, 0), linvel=(2, 0, 0.2), restitution=0.5),
+    "ellipsoid": physics.Ellipsoid((0.3, 0.25, 0.4), 1.0, pos=(0.1, 0.25, 0), linvel=(3, 0, 0.1), angvel=(0.4, 0, -12)),
+    "capsule": physics.Capsule(
+        0.3, 0.8, 1.0, pos=(0.1, 0.3, 0), quat=(0.5**0.5, 0.5**0.5, 0, 0), linvel=(3, 0, 0), angvel=(0, 0, -10)
+    ),
+    "block": physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.15, 0), linvel=(3, 0, 0.2)),
+    "tumbling block": physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.5, 0), linvel=(4, 0, 0.2), angvel=(1, 2, -9)),
+}
+
+
+@pytest.mark.parametrize("name", sweep(OVER_SEAMS, ["bouncing ball", "ellipsoid"]))
+def test_seams_between_parts_stop_nothing(name):
+    """Bodies roll, slide, bounce and tumble over seams of a compound as over one block."""
     plate = physics.Block((20, 1, 8), fixed=True, pos=(9, -0.5, 0))
-    ball = physics.Sphere(0.3, 1.0, pos=(0.1, 0.3, 0), linvel=(3, 0, 0.2), angvel=(0.2 / 0.3, 0, -10))
-    block = physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.15, 0), linvel=(3, 0, 0.2))
     ends = []
-    for plane in (plate, tiles(10)):
-        world = world_of(ball if body == "ball" else block, plane, walls=())
-        world.step(steps=60)
+    for ground in (plate, tiles(10)):
+        world = world_of(OVER_SEAMS[name], ground, walls=())
+        world.step(steps=50)
         ends.append(world.pos[0, 0].copy())
     assert ends[0][0] > 1.01  # past a seam
     np.testing.assert_allclose(ends[1], ends[0], rtol=0, atol=1e-10)
+
+
+def test_a_concave_corner_is_touched_on_both_sides():
+    """A block lies in the corner of a shelf, flush with both parts: it has all corners of both faces as contacts."""
+    shelf = physics.Compound(
+        [
+            physics.Block((6, 1, 6), fixed=True, pos=(0, -0.5, 0)),
+            physics.Block((1, 3, 6), fixed=True, pos=(-1.5, 1.5, 0)),
+        ],
+        fixed=True,
+    )
+    block = physics.Block((0.6, 0.4, 0.5), 2.0, pos=(-0.7, 0.2, 0))
+    world = world_of(block, physics.Compound(shelf.parts, fixed=True, pos=shelf.centroid), walls=())
+    push = np.zeros((2, 6))
+    push[0, 0] = -50.0
+    world.step(push, steps=20)
+    np.testing.assert_allclose(world.pos[0, 0], block.pos, rtol=0, atol=1e-9)
+    contacts = world.read_contacts()
+    assert contacts.count[0] == 8
+    np.testing.assert_allclose(contacts.force[0, :8].sum(axis=0), (50.0, 2.0 * G, 0), atol=1e-6)
+
+
+def slopes(angle: float) -> list[physics.Body]:
+    """Two fixed plates that meet in the line x = y = 0, and rise from there by `angle` [rad]."""
+    parts = []
+    for side in (1, -1):
+        turn = side * angle / 2
+        down = np.array([-math.sin(side * angle), math.cos(side * angle), 0])
+        middle = 2 * np.array([side * math.cos(angle), math.sin(angle), 0]) - 0.5 * down
+        parts.append(physics.Block((4, 1, 6), fixed=True, pos=middle, quat=(math.cos(turn), 0, 0, math.sin(turn))))
+    return parts
+
+
+def test_an_edge_stands_in_the_bottom_of_a_valley():
+    """Both sides hold it in the line in which they meet, where each of them is within rounding of the other."""
+    parts = slopes(0.1)
+    whole = physics.Compound(parts, fixed=True)
+    block = physics.Block(
+        (1, 1, 2), 3.0, pos=(0, 0.5**0.5, 0), quat=(math.cos(math.pi / 8), 0, 0, math.sin(math.pi / 8))
+    )
+    world = world_of(block, physics.Compound(parts, fixed=True, pos=whole.centroid), walls=())
+    world.step()
+    np.testing.assert_allclose(world.pos[0, 0], block.pos, rtol=0, atol=1e-8)
+    assert world.read_contacts().count[0] == 4
+
+
+@pytest.mark.parametrize("angle", [0.1, pytest.param(-0.1, marks=pytest.mark.exhaustive)], ids=["valley", "ridge"])
+def test_parts_that_meet_at_an_angle_are_touched_as_separate_bodies(angle):
+    """No contact of a ball is left out: not at the bottom of a valley, nor on a ridge."""
+    parts = slopes(angle)
+    whole = physics.Compound(parts, fixed=True)
+    height = 0.3 / math.cos(angle) + 0.8 * math.sin(angle)
+    ball = physics.Sphere(0.3, 1.0, pos=(-0.8, height, 0), linvel=(1.5, 0, 0))
+    apart = world_of(ball, *parts, walls=())
+    joined = world_of(ball, physics.Compound(parts, fixed=True, pos=whole.centroid), walls=())
+    for world in (apart, joined):
+        world.step(steps=60)
+    np.testing.assert_allclose(joined.pos[0, 0], apart.pos[0, 0], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("start", sweep(["spins", "falls"], ["spins"]))
+def test_a_part_far_from_the_centre_passes_through_nothing(start):
+    """A dumbbell spins by two radians a step, or falls by four metres a step: a thin plate is to it as a wall."""
+    ends = [physics.Sphere(0.05, 1.0, pos=(x, 0, 0)) for x in (-1, 1)]
+    motion = {"pos": (0, 3, 0), "linvel": (0, -400, 0), "angvel": (0, 0, 3)}
+    if start == "spins":
+        motion = {"pos": (0, 0.9, 0), "quat": (math.cos(0.26), 0, 0, math.sin(0.26)), "angvel": (0, 0, 200)}
+    plate, wall = physics.Block((20, 0.02, 20), fixed=True), physics.HalfSpace((0, 1, 0), 0.01)
+    laws = [physics.Contact(restitution=0.5), physics.Friction(0.3)]
+    found = []
+    for bodies, walls in (([plate], ()), ([], [wall])):
+        world = world_of(physics.Compound(ends, **motion), *bodies, walls=walls, laws=laws)
+        world.step(steps=15)
+        found.append(world.pos[0, 0].copy())
+    assert found[0][1] > 0.5
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-7)  # of an impact found within 1e-7 of the radius
 
 
 # --- rest and collisions ---------------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from physics.kernels.multibody.narrowphase.body_wall import collide_body_wall, c
 from physics.kernels.multibody.narrowphase.box_box import collide_blocks
 from physics.kernels.multibody.narrowphase.capsule import collide_capsule
 from physics.kernels.multibody.narrowphase.capsule_contacts import collide_capsule_wall
+from physics.kernels.multibody.narrowphase.covered_points import leave_out_covered
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import collide_ellipsoid
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import collide_ellipsoid_hull, collide_sphere_hull
 from physics.kernels.multibody.narrowphase.hull_hull import collide_hulls
@@ -91,11 +92,12 @@ def _collide_parts(a, b, margin, h, ellipsoids, hulls, many):
     """Add the contacts of bodies a and b, if one of them is a compound; return whether one is."""
     if not (is_compound(a, many) or is_compound(b, many)):
         return False
-    span = many.bodies.parts.span
+    span, first = many.bodies.parts.span, many.counts[NUM_CONTACTS]
     for part in range(span[a, 0], span[a, 1]):
         for other in range(span[b, 0], span[b, 1]):
             if _are_near(part, other, margin, many):
                 _collide(part, other, margin, h, ellipsoids, hulls, many)
+    leave_out_covered(first, h, many)
     return True
 
 
