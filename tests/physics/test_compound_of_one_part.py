@@ -17,7 +17,8 @@ BALL = physics.Sphere(0.3, 1.0, pos=(0, 2.5, 0))
 SPRING = physics.Spring(
     body=0, other=1, anchor=(0, 0, 0), point=(0.1, 0, 0.1), stiffness=100.0, damping=1.0, length=1.0
 )
-TURNTABLE = {"fixed": True, "pos": (0, -0.5, 0), "motion": physics.Motion(spin=(0, 1, 0), surface_velocity=(0.3, 0, 0))}
+DRIVE = physics.Motion(spin=(0, 1, 0), surface_velocity=(0.3, 0, 0))
+TURNTABLE = {"fixed": True, "pos": (0, -0.5, 0), "motion": DRIVE}
 FAST = {**START, "angvel": (100, 300, -200)}
 
 # Part, its start, other bodies, effects, accuracy, steps.
