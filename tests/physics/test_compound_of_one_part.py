@@ -11,6 +11,7 @@ pytestmark = [pytest.mark.interpreted, pytest.mark.exhaustive]
 
 FLOOR = physics.HalfSpace((0, 1, 0))
 LAWS = [physics.Gravity(), physics.Contact(0.3), physics.Friction(0.5)]
+PLATE = physics.Block((4, 1, 4), fixed=True)
 BRICK = physics.Block((1, 0.6, 0.4), 2.0)
 START = {"pos": (0.1, 0.9, 0), "quat": (0.8, 0.6, 0, 0), "linvel": (1, -2, 0.5), "angvel": (1, 2, -3)}
 BALL = physics.Sphere(0.3, 1.0, pos=(0, 2.5, 0))
@@ -25,10 +26,7 @@ FAST = {**START, "angvel": (100, 300, -200)}
 SCENES = {
     "springs": (BRICK, START, [BALL], [*LAWS, SPRING, physics.Push((1, 0, 0))], "balanced", 60),
     "sleep": (BRICK, {"pos": (0, 0.31, 0)}, [BALL], [*LAWS, physics.Sleeping()], "balanced", 150),
-    "a motion": (
-        physics.Block((4, 1, 4), fixed=True), TURNTABLE, [physics.Sphere(0.3, 1.0, pos=(0.5, 0.4, 0))], LAWS, "balanced",
-        40,
-    ),
+    "a motion": (PLATE, TURNTABLE, [physics.Sphere(0.3, 1.0, pos=(0.5, 0.4, 0))], LAWS, "balanced", 40),
     "error control": (BRICK, START, [BALL], LAWS, "precise", 20),
     "a fast spin": (BRICK, FAST, [physics.Block((0.5, 0.5, 0.5), 1.0, pos=(0, 2, 0))], LAWS, "balanced", 30),
     "impacts in turn": (BRICK, START, [BALL], LAWS, physics.Accuracy(collisions="sequential"), 40),
