@@ -62,8 +62,9 @@ class QueryCalls:
         key, same = (kernel, is_all, id(solid)), _contents(question)
         scratches = self._scratch_for(solid)
         if key not in self._calls:
+            types = scratches[0].bodies.capsules, scratches[0].bodies.parts is None  # on which the kernel depends
             self._calls[key] = [
-                bound_alike(None, kernel, queue, places, self._bodies, scratch, *question)
+                bound_alike(types, kernel, queue, places, self._bodies, scratch, *question)
                 for queue, scratch in zip(queues, scratches)
             ]
         elif self._bound[key] != same:
