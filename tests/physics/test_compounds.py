@@ -187,7 +187,7 @@ OVER_SEAMS = {
     "capsule": physics.Capsule(
         0.3, 0.8, 1.0, pos=(0.1, 0.3, 0), quat=(0.5**0.5, 0.5**0.5, 0, 0), linvel=(3, 0, 0), angvel=(0, 0, -10)
     ),
-    "block": physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.15, 0), linvel=(3, 0, 0.2)),
+    "block": physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.5, 0.15, 0), linvel=(3, 0, 0.2)),
     "tumbling block": physics.Block((0.5, 0.3, 0.4), 1.0, pos=(0.1, 0.5, 0), linvel=(4, 0, 0.2), angvel=(1, 2, -9)),
 }
 
