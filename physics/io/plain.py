@@ -15,13 +15,14 @@ from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
+from physics.scene.compound import PARTS, Compound
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
 from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene
 from physics.summary import shown
 
-BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull)
+BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull, Compound)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
 """Classes that each list of a scene may hold."""
@@ -34,7 +35,7 @@ def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
 
 
 def plain_table(item) -> dict[str, Any]:
-    """Convert a body, wall, effect or motion to a table; parameters at their defaults are left out."""
+    """Convert a body or part, wall, effect or motion to a table; parameters at their defaults are left out."""
     found = {} if isinstance(item, (HalfSpace, Motion)) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
@@ -46,7 +47,7 @@ def plain_table(item) -> dict[str, Any]:
 
 
 def _plain(value):
-    if isinstance(value, Motion):
+    if isinstance(value, (Motion, Body)):
         return plain_table(value)
     return [_plain(part) for part in value] if isinstance(value, tuple) else value
 
@@ -100,9 +101,29 @@ def build(places: Places, name: str, index: int, table: Mapping[str, Any], known
     for key, field in parameters.items():
         if field.default is MISSING and field.default_factory is MISSING and key not in table:
             raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
+    if kind is Compound and isinstance(table["parts"], list):
+        table["parts"] = [_part(places, name, index, k, part) for k, part in enumerate(table["parts"])]
     try:
         return kind(**table)
     except (ValueError, TypeError) as error:
         told = re.match(r"(?:\w+\.)?(\w+)(?:\[[^]]*\])? ", str(error))
         key = told.group(1) if told and told.group(1) in parameters else None
         raise places.error(name, index, key, str(error)) from None
+
+
+class _PartPlaces(Places):
+    """Places of a part of a compound, for errors: those of its body, and the number of the part."""
+
+    def __init__(self, places: Places, name: str, index: int):
+        super().__init__()
+        self._places, self._of = places, (name, index)
+
+    def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
+        return self._places.error(*self._of, "parts", f"parts[{index}]: {message}")
+
+
+def _part(places: Places, name: str, index: int, k: int, part: Any) -> Any:
+    """Make part number `k` of the compound in table number `index`; what is no table stays as it is."""
+    if not isinstance(part, Mapping):
+        return part
+    return build(_PartPlaces(places, name, index), name, k, part, PARTS)

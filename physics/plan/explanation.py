@@ -14,6 +14,7 @@ from physics.scene.force_fields import FIELDS
 from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import has_restitution
 from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE
+from physics.scene.parts import with_parts
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,9 @@ def _contact_row(scene, contact) -> Row:
     if contact is not None and touching is not None and scene.walls and not touching[:, len(scene.bodies) :].any():
         return Row("wall contact", False, "groups keep all bodies from all walls", "")
     if contact is not None and scene.walls:
-        kinds = {body.kind for body in scene.bodies}
+        kinds = {body.kind for body in with_parts(scene.bodies)}
         also = ", corners of hulls" * ("hull" in kinds) + ", ends of capsules" * ("capsule" in kinds)
+        also += ", parts of compounds" * ("compound" in kinds)
         return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{also}, impacts, solver")
     if contact is not None:
         return Row("wall contact", False, "declared, but the scene has no walls", "")
@@ -48,8 +50,8 @@ def _contact_row(scene, contact) -> Row:
 
 def _between_row(scene, contact, many) -> Row:
     if many:
-        kinds = {body.kind for body in scene.bodies}
-        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "hull") if kind in kinds)
+        kinds = {body.kind for body in with_parts(scene.bodies)}
+        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "hull", "compound") if kind in kinds)
         return Row(
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )

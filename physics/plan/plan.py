@@ -10,15 +10,12 @@ from physics import validation
 from physics.accuracy import INTEGRATORS, Accuracy, resolve
 from physics.annotations import Preset
 from physics.html_table import parts_table
-from physics.kernels.state.layout import BLOCK, CAPSULE, ELLIPSOID, HULL, SPHERE
 from physics.plan.explanation import Row, make_rows
 from physics.scene.needs import find_needs, is_isotropic, is_tilted
 from physics.scene.scene import Scene
 from physics.schemes import scheme_for
 from physics.schemes.scheme import Scheme, Switches
 from physics.summary import parts_repr
-
-SHAPE_CODES = {"block": BLOCK, "sphere": SPHERE, "ellipsoid": ELLIPSOID, "hull": HULL, "capsule": CAPSULE}
 
 # Largest number of effects that a `repr` names.
 MOST_ROWS = 20
@@ -44,7 +41,8 @@ class Plan(Switches):
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
-            self.hulls, self.capsules, self.sleeping, self.fixed, self.lone, self.grouped, self.features,
+            self.hulls, self.capsules, self.compounds, self.sleeping, self.fixed, self.lone, self.grouped,
+            self.features,
             self.material_columns > 0, self.walls_differ, self.pair_materials, self.motion_columns > 0, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -113,6 +111,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         ellipsoids=needs.ellipsoids or None,
         hulls=needs.hulls or None,
         capsules=needs.capsules or None,
+        compounds=needs.compounds or None,
         sleeping=needs.sleeping or None,
         features=needs.features,
         fields=needs.fields,

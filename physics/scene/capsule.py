@@ -13,6 +13,8 @@ from physics import validation
 from physics.keywords import known_keywords
 from physics.mass import inertia
 from physics.scene.bodies import FROM_DENSITY, Body, body_repr
+from physics.scene.groups import GROUP, MASK
+from physics.scene.motion import Motion
 
 
 @known_keywords
@@ -57,6 +59,9 @@ class Capsule(Body):
             friction: float | None = None,
             restitution: float | None = None,
             fixed: bool = False,
+            group: int = GROUP,
+            mask: int = MASK,
+            motion: Motion | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

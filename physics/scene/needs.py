@@ -23,6 +23,7 @@ from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, S
 from physics.scene.force_field import Field, FieldSlot, field_slots
 from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import find_materials, has_restitution
+from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
 
 # Moments of inertia that differ by less than this share are equal to rounding; their gyroscopic torque would be noise.
@@ -53,7 +54,7 @@ class Needs:
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
     lone : bool
-        Whether exactly one body moves, and it can touch fixed bodies.
+        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
@@ -61,7 +62,7 @@ class Needs:
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
-        Shapes of the bodies, such as ``block``.
+        Shapes of the bodies, such as ``block``, and of the parts of compounds.
     features : int
         Features with which a body may touch a wall: the 8 vertices of a block if the scene has blocks, else 1.
     isotropic : bool
@@ -117,6 +118,11 @@ class Needs:
         """True if capsules can touch walls or other bodies."""
         return self.touching and "capsule" in self.kinds
 
+    @property
+    def compounds(self) -> bool:
+        """True if compounds can touch walls or other bodies."""
+        return self.touching and "compound" in self.kinds
+
 
 def is_isotropic(moments: np.ndarray) -> Any:
     """True (...) where the three `moments` (..., 3) of a body are equal to rounding: it needs no gyroscopic torque."""
@@ -131,7 +137,7 @@ def is_tilted(R: np.ndarray) -> Any:
 def find_needs(scene: Scene) -> Needs:
     """Find the effects that can act in a scene."""
     contact, friction, gravity = scene.effect(Contact), scene.effect(Friction), scene.effect(Gravity)
-    kinds = frozenset(body.kind for body in scene.bodies)
+    kinds = frozenset(body.kind for body in with_parts(scene.bodies))
     fixed = any(body.fixed for body in scene.bodies)
     meeting, at_walls, grouped = _meetings(scene, contact, fixed)
     touching = at_walls or meeting
@@ -147,7 +153,7 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
-        lone=meeting and fixed and len(axes) == 1,
+        lone=meeting and fixed and len(axes) == 1 and "compound" not in kinds,
         grouped=grouped,
         motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),
@@ -179,7 +185,7 @@ def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool,
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
-    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in scene.bodies)
+    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in with_parts(scene.bodies))
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,
         LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.scene.bodies import Body
+from physics.scene.parts import with_parts
 
 
 def polyhedra(bodies: tuple[Body, ...]) -> list:
-    """Polyhedron of each body for `hull_tables.make_hulls`; an empty list if no pair of bodies needs them.
+    """Polyhedron of each body and part for `hull_tables.make_hulls`; an empty list if no pair needs them.
 
-    A hull has its own polyhedron, a block the unit cube, and a round body None. Hulls need them, and so do capsules
-    beside blocks.
+    A hull has its own polyhedron, a block the unit cube, a round body and a compound None. Hulls need them, and so do
+    capsules beside blocks. The parts of compounds follow behind all bodies.
     """
-    kinds = {body.kind for body in bodies}
+    kinds = {body.kind for body in with_parts(bodies)}
     return every_polyhedron(bodies) if "hull" in kinds or {"capsule", "block"} <= kinds else []
 
 
 def every_polyhedron(bodies: tuple[Body, ...]) -> list:
-    """Polyhedron of each body, also of blocks in a scene without hulls; None for a round body."""
+    """Polyhedron of each body and part, also of blocks in a scene without hulls; None for a round body."""
     blocks = {"block": CUBE}
-    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in bodies]
+    return [body.polyhedron if body.kind == "hull" else blocks.get(body.kind) for body in with_parts(bodies)]

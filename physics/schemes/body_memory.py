@@ -12,6 +12,7 @@ import numpy as np
 from physics.compiler.decorators import entry_kernel, kernel
 from physics.kernels.multibody.data import allocation
 from physics.kernels.multibody.data import arrays as many
+from physics.scene.parts import part_count
 from physics.scene.polyhedra import polyhedra
 from physics.scene.scene import Scene
 from physics.schemes.contact_memory import ContactMemory, are_indices, call
@@ -98,8 +99,8 @@ class BodyMemory(ContactMemory):
         self._keeps_part = keeps_part
 
     def shape(self, scene: Scene, switches: Any, worlds: int) -> tuple[int, int]:
-        bodies, walls = len(scene.bodies), len(scene.walls)
-        return worlds, allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies), self._keeps_part)
+        parts, walls = part_count(scene.bodies), len(scene.walls)
+        return worlds, allocation.warm_start_size(parts, walls, polyhedra(scene.bodies), self._keeps_part)
 
     def rows_per_world(self, bodies: int) -> int:
         return 1

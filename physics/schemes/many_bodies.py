@@ -19,6 +19,7 @@ from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.effects import Contact
 from physics.scene.groups import group_table
 from physics.scene.needs import Needs
+from physics.scene.parts import part_count, part_list
 from physics.scene.polyhedra import polyhedra
 from physics.scene.scene import Scene
 from physics.schemes import objections
@@ -36,7 +37,7 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed ones; also for hulls and capsules at walls.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls, capsules and compounds at walls.
 
     Bodies at walls that are tied by springs are stepped here, too.
 
@@ -56,6 +57,7 @@ class ManyBodies(Scheme):
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
+        is_coupled = is_coupled or needs.compounds
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
@@ -63,8 +65,8 @@ class ManyBodies(Scheme):
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, capsules, fixed bodies, groups that keep some "
-                "bodies from some walls, and Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, capsules, compounds, fixed bodies, groups "
+                "that keep some bodies from some walls, and Spring between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
@@ -76,7 +78,7 @@ class ManyBodies(Scheme):
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
             groups=group_table(scene) if switches.grouped else None,
-            capsules=switches.capsules,
+            capsules=switches.capsules, parts=part_list(scene.bodies) if switches.compounds else (),
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             motion_columns=switches.motion_columns, lone=switches.lone, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
@@ -87,8 +89,8 @@ class ManyBodies(Scheme):
         """Make the memory in which error control keeps states of a world while it tries parts; None without it."""
         if not self.is_error_controlled:
             return None
-        bodies, walls = len(scene.bodies), len(scene.walls)
-        memory = allocation.warm_start_size(bodies, walls, polyhedra(scene.bodies))
+        bodies, parts, walls = len(scene.bodies), part_count(scene.bodies), len(scene.walls)
+        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies))
         return allocation.make_snapshots(bodies, memory, switches.lone)
 
     def acting(self, accuracy: Accuracy) -> Accuracy:

@@ -75,6 +75,8 @@ class Switches:
         Whether hulls can touch walls or bodies.
     capsules : True or None
         Whether capsules can touch walls or bodies.
+    compounds : True or None
+        Whether compounds can touch walls or bodies.
     sleeping : True or None
         Whether bodies may sleep.
     features : int
@@ -108,6 +110,7 @@ class Switches:
     ellipsoids: bool | None
     hulls: bool | None
     capsules: bool | None
+    compounds: bool | None
     sleeping: bool | None
     features: int
     fields: tuple[FieldSlot, ...]

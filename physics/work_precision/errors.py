@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from physics.rotations import rotation_matrices
-from physics.scene.bodies import Body
 from physics.scene.effects import RESISTANCES, Contact, Friction, Gravity
 from physics.scene.force_field import Field
 from physics.scene.scene import Scene
+from physics.scene.support import support
 
 
 def angles_between(quat: np.ndarray, true: np.ndarray) -> np.ndarray:
@@ -113,22 +113,9 @@ def deepest_penetration(scene: Scene, pos, quat) -> float:
         for wall in scene.walls:
             normal = np.array(wall.normal)
             direction = np.einsum("nji,j->ni", R, normal)
-            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - _support(body, -direction)
+            gap = pos[:, b] @ normal + direction @ body.center - wall.offset - support(body, -direction)
             worst = 0.0 + float(np.maximum(worst, -gap.min()))  # keeps NaN, and turns -0.0 into 0.0
     return worst
-
-
-def _support(body: Body, direction: np.ndarray) -> np.ndarray:
-    """Support function (n,) [m] of a body about its geometric centre, for unit vectors (n, 3) in the body frame."""
-    if body.kind == "hull":
-        return (direction @ body.polyhedron.vertices.T).max(axis=-1)
-    if body.kind == "capsule":
-        radius, reach = body.dimensions[:2]
-        return (reach - radius) * np.abs(direction[..., 1]) + radius
-    scaled = direction * body.dimensions
-    if body.kind == "block":
-        return np.abs(scaled).sum(axis=-1)
-    return np.linalg.norm(scaled, axis=-1)
 
 
 def event_error(events: Sequence, true: Sequence) -> float | None:

@@ -12,8 +12,8 @@ from physics.html_table import parts_table
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.queries.nearest_queries import Found
 from physics.kernels.state.layout import SPHERE
-from physics.plan.plan import SHAPE_CODES
 from physics.scene.bodies import Body
+from physics.scene.parts import SHAPE_CODES
 from physics.summary import parts_repr, shown
 from physics.world.query_arguments import result
 from physics.world.query_calls import CAPSULE
@@ -109,6 +109,8 @@ def shape_numbers(shape: Body | None) -> tuple[int, Any, float, Any, Any]:
     if shape is None:
         return _POINT
     validation.instance(shape, Body, "shape", "a body such as physics.Sphere(...), or None for a point")
+    if shape.kind == "compound":
+        raise ValueError(f"shape is {shown(shape)}; allowed are convex shapes: ask for each part of a compound")
     solid = shape.polyhedron if shape.kind == "hull" else SOLIDS.get(shape.kind)  # type: ignore[attr-defined]
     radius = float(solid.radius) if shape.kind == "hull" else 0.0
     dims, center = (tuple(map(float, part)) for part in (shape.dimensions, shape.center))

@@ -158,8 +158,8 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
             _check_spheres(halves[rows])
         if body.kind == "capsule":
             _check_capsules(halves[rows])
-        if body.kind == "hull":
-            _check_hull(b, body, halves[rows])
+        if body.kind in ("hull", "compound"):
+            _check_unscaled(b, body, halves[rows])
         if body.fixed:
             _write_body(params[rows], body, masses[rows], np.full((1, 3), np.inf), np.eye(3)[None], halves[rows])
             continue
@@ -201,7 +201,7 @@ def _principal_axes(body, masses, halves, tensors) -> tuple[np.ndarray, np.ndarr
         return np.array([moments for moments, _ in each]).reshape(-1, 3), np.array([R for _, R in each]).reshape(
             -1, 3, 3
         )
-    if body.inertia_body is not None or body.kind == "hull":
+    if body.inertia_body is not None or body.kind in ("hull", "compound"):
         moments, R = principal_axes(body.inertia)
         return moments * (masses / body.mass)[:, None], R[None]
     return body.uniform_moments(halves, masses), np.eye(3)[None]
@@ -221,13 +221,17 @@ def _check_capsules(halves) -> None:
         raise ValueError(f"size is {size} for a capsule; allowed are diameter, a larger length, the diameter again")
 
 
-def _check_hull(b, body, halves) -> None:
+def _check_unscaled(b, body, halves) -> None:
     if (halves != body.dimensions).any():
         size = (2 * halves[(halves != body.dimensions).any(axis=1)][0]).tolist()
         raise ValueError(
-            f"size is {size} for Scene.bodies[{b}], a hull, which has its points in all worlds; allowed is twice its "
-            f"dimensions, {(2 * body.dimensions).tolist()}"
+            f"size is {size} for Scene.bodies[{b}], a {body.kind}, which has its {_OWN[body.kind]} in all worlds; "
+            f"allowed is twice its dimensions, {(2 * body.dimensions).tolist()}"
         )
+
+
+_OWN = {"hull": "points", "compound": "parts"}
+"""Shapes that no world scales, and their descriptions."""
 
 
 def _check_allowed(plan, moments, R) -> None:

@@ -42,10 +42,19 @@ def other_setting(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> tuple[s
 
 
 def _body(body) -> str:
-    """Text for a body: its kind, for a hull a checksum of its corners, whether it is fixed, and its groups."""
+    """Text for a body: its kind, for a hull or compound a checksum of its shape, whether it is fixed, its groups."""
     kind = f"hull {crc32(body.polyhedron.vertices.tobytes()):08x}" if body.kind == "hull" else body.kind
+    if body.kind == "compound":
+        kind = f"compound {crc32(b''.join(_placed(each) for each in body.placed_parts)):08x}"
     kind = f"fixed {kind}" if body.fixed else kind
     return " with ".join([kind, *_settings(body, {"group": GROUP, "mask": MASK})])
+
+
+def _placed(placed) -> bytes:
+    """Bytes of the shape of a compound's part: its kind, pose, dimensions, and the corners of a hull."""
+    part = placed.part
+    shape = part.polyhedron.vertices if part.kind == "hull" else part.dimensions
+    return part.kind.encode() + b"".join(each.tobytes() for each in (placed.place, placed.R, shape))
 
 
 def _wall(wall: HalfSpace) -> str:

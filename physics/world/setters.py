@@ -220,7 +220,7 @@ def check_place(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.
 
 
 def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: np.ndarray, what: str) -> None:
-    """Refuse two bodies with their geometric centres in the same place, since no direction separates them best.
+    """Refuse two convex bodies with their centres in the same place, since no direction separates them best.
 
     Bodies are sorted along the direction `SKEW`. Equal centres are neighbours along any direction; other centres hardly
     ever coincide along this one. So later neighbours are compared only while some that touch nothing share a place.
@@ -239,6 +239,8 @@ def _check_centres(world: Batch, state: np.ndarray, params: np.ndarray, chosen: 
                 return
             for k, i in found:
                 pair = sorted((int(order[k, i]), int(order[k, i + lag])))
+                if any(bodies[b].kind == "compound" for b in pair):
+                    continue  # whose centre may lie outside of all its parts
                 if may_meet(bodies[pair[0]], bodies[pair[1]], contact.between_bodies):
                     raise _same_place(world, state, int(chosen[k]), k * world.body_count, pair, what)
 

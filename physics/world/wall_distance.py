@@ -10,7 +10,11 @@ from physics.kernels.half_space.gap_queries import deepest_gaps
 from physics.kernels.state import layout as at
 from physics.rotations import rotation_matrices
 from physics.scene.groups import touching_pairs
+from physics.scene.support import support
 from physics.world.batch import Batch
+
+REACHED = ("hull", "capsule", "compound")
+"""Kinds of bodies whose gaps `lowest_reach` gives, since `gap_queries` does not know them."""
 
 
 def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np.ndarray:
@@ -23,11 +27,13 @@ def geometric_centres(world: Batch, state: np.ndarray, params: np.ndarray) -> np
 
 
 def lowest_reach(body: Any, quat: np.ndarray, dimensions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Lowest coordinate (k, walls) of a hull or capsule along each wall's normal, from its centre, in k poses [m].
+    """Lowest coordinate (k, walls) of a body in `REACHED` along each wall's normal, from its centre, in k poses [m].
 
     `quat` (k, 4) are attitudes, `dimensions` (k, 3) half extents [m], and `normals` (walls, 3) unit vectors.
     """
     R = rotation_matrices(quat)
+    if body.kind == "compound":
+        return -support(body, -np.einsum("wi,kij->kwj", normals, R))
     if body.kind == "hull":
         return np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
     radius, half = dimensions[:, :1], dimensions[:, 1:2] - dimensions[:, :1]
@@ -52,11 +58,11 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
         Index of the wall with the smallest gap; -1 without walls.
     """
     gaps, which = np.empty(len(state)), np.empty(len(state), np.int64)
-    touching, reached = touching_pairs(world.scene, True), ("hull", "capsule")
+    touching = touching_pairs(world.scene, True)
     if touching is None:
         deepest_gaps(np.arange(len(state)), state, params, world.shapes, world.walls, gaps, which)
     for b, body in enumerate(world.scene.bodies):
-        if touching is None and body.kind not in reached:
+        if touching is None and body.kind not in REACHED:
             continue
         own = np.arange(b, len(state), world.body_count)
         walls = np.arange(len(world.walls)) if touching is None else np.flatnonzero(touching[b, world.body_count :])
@@ -64,14 +70,14 @@ def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.n
             found, index = np.empty(len(own)), np.empty(len(own), np.int64)
             deepest_gaps(own, state, params, world.shapes, world.walls[walls], found, index)
             gaps[own], which[own] = found, np.append(walls, -1)[index]
-        if body.kind in reached and len(walls):
+        if body.kind in REACHED and len(walls):
             each = _gaps(body, state[own], params[own], world.walls[walls])
             gaps[own], which[own] = each.min(axis=1), walls[each.argmin(axis=1)]
     return gaps, which
 
 
 def _gaps(body: Any, state: np.ndarray, params: np.ndarray, walls: np.ndarray) -> np.ndarray:
-    """Gaps (k, walls) of a hull or capsule to walls (walls, WALL_SIZE), in k rows of `state` and `params` [m]."""
+    """Gaps (k, walls) of a body in `REACHED` to walls (walls, WALL_SIZE), in k rows of `state` and `params` [m]."""
     normals, offsets = walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], walls[:, at.WALL_OFFSET]
     sizes = params[:, at.DIMENSIONS : at.DIMENSIONS + 3]
     reach = lowest_reach(body, state[:, at.QUAT : at.QUAT + 4], sizes, normals)

@@ -19,11 +19,12 @@ from physics.keywords import known_keywords
 from physics.parallel.bound_call import BoundCall
 from physics.parallel.exclusive import exclusive, in_use, watch
 from physics.parallel.team import Team
-from physics.plan.plan import SHAPE_CODES, make_plan
+from physics.plan.plan import make_plan
 from physics.scene.body_names import body_names
 from physics.scene.effects import Actuator, Friction, RollingFriction, SpinFriction
 from physics.scene.force_field import Field
 from physics.scene.motion import Motion
+from physics.scene.parts import SHAPE_CODES
 from physics.scene.scene import Scene
 from physics.summary import counted
 from physics.undo import undo_on_error
@@ -322,11 +323,12 @@ class World(Touching, Querying):
             equal in each world, too.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere; of a capsule
-            diameter, whole length and diameter [m]. The size of a hull cannot change: only twice its `dimensions` is
-            accepted. Position and velocity stay, and so does the `center` of a block, in metres.
+            diameter, whole length and diameter [m]. The size of a hull or compound cannot change: only twice its
+            `dimensions` is accepted. Position and velocity stay, and so does the `center` of a block, in metres.
         inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
             Inertia tensor about the centre of mass, body frame [kg m²]. None: a change of mass or size sets the tensor
-            of uniform density; if the scene's body has an `inertia_body`, this is scaled with the mass instead.
+            of uniform density; if the scene's body has an `inertia_body`, or is a hull or compound, its tensor is
+            scaled with the mass instead.
         gravity : (3,) or (k, 3) array_like, optional
             Acceleration of gravity, world frame [m/s²].
         effects : sequence of effects, optional

@@ -7,6 +7,7 @@ from itertools import compress
 import numpy as np
 
 from rigid_env.rendering import palette
+from rigid_env.rendering.frame import body_colour
 from rigid_env.rendering.solids import pose
 
 SILHOUETTE_WIDTH, EDGE_WIDTH = 1.4, 1.0
@@ -17,11 +18,6 @@ SILHOUETTE_DARKENING, EDGE_LIGHTENING = 0.55, 0.38
 GOAL_FACE_TINT = 0.78
 GOAL_FACE_INSET = 0.86
 GOAL_OUTLINE_WIDTH = 2.2
-
-
-def body_colour(body, index):
-    """sRGB colour of a `BodyView` before shading: its own, or the palette's colour for its index in the frame."""
-    return tuple(body.colour) if body.colour is not None else palette.BODIES[index % len(palette.BODIES)]
 
 
 def goal_colour(goal):
@@ -37,8 +33,9 @@ def draw_bodies(canvas, frame, room):
     bodies, goal = frame.bodies, frame.goal
     if not bodies:
         return
-    colours = [body_colour(body, index) for index, body in enumerate(bodies)]
     has_goal_face = goal is not None and goal.goal_face is not None and bodies[0].kind == "block"
+    frame = frame.solids
+    colours = [body_colour(body, index) for index, body in enumerate(frame.bodies)]
     tint = (goal.goal_face, palette.mix(colours[0], goal_colour(goal), GOAL_FACE_TINT)) if has_goal_face else None
     solids, depths = pose(canvas, frame, np.array(colours, dtype=np.float64), SILHOUETTE_WIDTH, tint)
     for index in np.argsort(-depths, kind="stable").tolist():

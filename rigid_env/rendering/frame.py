@@ -5,14 +5,15 @@ It is the interface between simulation and renderer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from rigid_env.rendering.geometry import rotation_matrices
+from rigid_env.rendering import palette
+from rigid_env.rendering.geometry import quaternion_product, rotation_matrices
 
-BODY_KINDS = ("block", "sphere", "ellipsoid", "hull", "capsule")
+BODY_KINDS = ("block", "sphere", "ellipsoid", "hull", "capsule", "compound")
 
 FACE_COUNT = 6
 """Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
@@ -22,19 +23,24 @@ NO_POINTS = np.zeros((0, 3))
 NO_POINTS.setflags(write=False)
 
 
+def body_colour(body, index):
+    """sRGB colour of a `BodyView` before shading: its own, or the palette's colour for its index in the frame."""
+    return tuple(body.colour) if body.colour is not None else palette.BODIES[index % len(palette.BODIES)]
+
+
 @dataclass(frozen=True, eq=False)
 class BodyView:
     """Shape, pose and colour of one rigid body in a picture.
 
     Parameters
     ----------
-    kind : {"block", "sphere", "ellipsoid", "hull", "capsule"}
+    kind : {"block", "sphere", "ellipsoid", "hull", "capsule", "compound"}
         Kind of shape.
     dimensions : (3,) float
         [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A capsule: half extents, its
-        axis along body y. A hull: largest distances of its corners from `pos`.
+        axis along body y. A hull or compound: largest distances of its points from `pos`.
     pos : (3,) float
-        Geometric centre of the shape; of a hull its centre of mass. World frame [m].
+        Geometric centre of the shape; of a hull or compound its centre of mass. World frame [m].
     quat : (4,) float
         Unit quaternion w, x, y, z, body to world.
     colour : (3,) int or None
@@ -43,11 +49,14 @@ class BodyView:
         Corners of a hull from `pos`, body frame [m]; other shapes have none.
     faces : tuple of tuples of int
         Indices of the corners of each face of a hull, counter-clockwise as seen from outside.
+    parts : tuple of BodyView
+        Convex parts of a compound, with `pos` and `quat` in the frame of the compound, and without colours.
 
     Raises
     ------
     ValueError
-        On an unknown kind, a wrong shape, a dimension that is not positive, or a hull without faces.
+        On an unknown kind, a wrong shape, a dimension that is not positive, a hull without faces, or a compound without
+        parts.
     """
 
     kind: str
@@ -57,6 +66,7 @@ class BodyView:
     colour: tuple[int, int, int] | None = None
     corners: np.ndarray = field(default_factory=lambda: NO_POINTS)
     faces: tuple[tuple[int, ...], ...] = ()
+    parts: tuple[BodyView, ...] = ()
 
     def __post_init__(self):
         if self.kind not in BODY_KINDS:
@@ -67,8 +77,24 @@ class BodyView:
         _set_array(self, "corners", (-1, 3))
         if (self.kind == "hull") != bool(self.faces):
             raise ValueError(f"faces must be those of a hull, and of nothing else, not {self.faces!r} of a {self.kind}")
+        object.__setattr__(self, "parts", tuple(self.parts))
+        if (self.kind == "compound") != bool(self.parts):
+            raise ValueError(f"a compound alone must have parts, not {len(self.parts)} of a {self.kind}")
         if not (self.dimensions > 0.0).all():
             raise ValueError(f"dimensions must be positive, not {self.dimensions}")
+
+    @cached_property
+    def solids(self) -> tuple[BodyView, ...]:
+        """Convex views, world frame: the body alone, or the parts of a compound, in its colour."""
+        if not self.parts:
+            return (self,)
+        R = rotation_matrices(np.array([self.quat]))[0]
+        return tuple(
+            replace(
+                part, pos=self.pos + R @ part.pos, quat=quaternion_product(self.quat, part.quat), colour=self.colour
+            )
+            for part in self.parts
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,6 +239,23 @@ class Frame:
     def has_arrows(self):
         """True if the frame has a contact point, or an applied force or torque."""
         return len(self.contact_points) > 0 or bool(np.any(self.applied_force)) or bool(np.any(self.applied_torque))
+
+    @cached_property
+    def owners(self):
+        """Indices (solids,) int of the bodies to which the bodies of `solids` belong."""
+        return np.repeat(np.arange(len(self.bodies)), [len(body.solids) for body in self.bodies])
+
+    @cached_property
+    def solids(self):
+        """Frame with the parts of compounds as bodies, each in the colour of its compound; itself without compounds."""
+        if not any(body.parts for body in self.bodies):
+            return self
+        views = [
+            replace(solid, colour=body_colour(body, index))
+            for index, body in enumerate(self.bodies)
+            for solid in body.solids
+        ]
+        return replace(self, bodies=views)
 
     @cached_property
     def poses(self):

@@ -5,6 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 
+def quaternion_product(p, q):
+    """Quaternion (4,), w first, of the rotation q followed by p."""
+    a, b, c, d = p.tolist()
+    return np.array(((a, -b, -c, -d), (b, a, -d, c), (c, d, a, -b), (d, -c, b, a))) @ q
+
+
 def rotation_matrix(quat):
     """Rotation matrix of a quaternion.
 

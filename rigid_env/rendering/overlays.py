@@ -75,7 +75,7 @@ def draw_contacts(canvas, frame, room):
     """Draw discs at the contact points and red arrows of their forces; they are paler where a body hides them."""
     if len(frame.contact_points) == 0:
         return
-    is_hidden = hidden_points(frame.contact_points, frame.bodies, canvas.camera.eye)
+    is_hidden = hidden_points(frame.contact_points, frame.solids.bodies, canvas.camera.eye)
     pixels, depths = canvas.project(frame.contact_points)
     is_in_sight = canvas.are_in_sight(pixels[:, None], depths[:, None])
     for i in np.lexsort((-depths, ~is_hidden)):

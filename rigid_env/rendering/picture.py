@@ -13,6 +13,7 @@ from physics import HalfSpace, World, validation
 from physics.kernels.state import layout as at
 from rigid_env.extras import require
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
+from rigid_env.rendering.compounds import part_views
 from rigid_env.rendering.geometry import rotation_matrix
 
 WEIGHT_ARROW = 2.5  # length of the arrow of a force as large as the weight of body 0 [m]
@@ -91,7 +92,7 @@ def _body_view(world: World, index: int, body: int) -> BodyView:
     solid = world.scene.bodies[body].polyhedron if kind == "hull" else None
     outline = {} if solid is None else {"corners": solid.vertices, "faces": solid.loops}
     pos = world.pos[index, body] + rotation_matrix(quat) @ center if center.any() else world.pos[index, body]
-    return BodyView(kind, dimensions, pos, quat, **outline)
+    return BodyView(kind, dimensions, pos, quat, **outline, parts=part_views(world.scene.bodies[body]))
 
 
 def without_bodies(frame: Frame, camera: Camera) -> Frame:

@@ -130,6 +130,7 @@ class ShadowLayer:
         frame : Frame
             Frame with at least one body.
         """
+        frame = frame.solids
         groups = outlines(frame)
         self._total.fill(0)
         rows = [found for wall in walls if (found := self._add_wall(camera, wall, frame.poses, groups)) is not None]

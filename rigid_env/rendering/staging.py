@@ -11,7 +11,7 @@ from physics import Gravity, Scene
 from rigid_env.rendering import BodyView, Camera, Frame, WallView
 from rigid_env.rendering.backdrop import MAJOR
 from rigid_env.rendering.camera_argument import as_camera, upwards
-from rigid_env.rendering.geometry import rotation_matrix
+from rigid_env.rendering.geometry import quaternion_product, rotation_matrix
 
 Y = np.array((0.0, 1.0, 0.0))
 FAR_SPAN = 40.0  # largest extent of a motion that is shown whole, in extents of its largest body
@@ -151,8 +151,8 @@ class Stage:
         scale = self._body_scale
         corners = {} if body.corners is None else {"corners": scale * np.asarray(body.corners)}
         return replace(
-            body, pos=self._placed_point(body.pos), quat=_product(self._turn, body.quat),
-            dimensions=scale * body.dimensions, **corners,
+            body, pos=self._placed_point(body.pos), quat=quaternion_product(self._turn, body.quat),
+            dimensions=scale * body.dimensions, parts=tuple(_scaled(part, scale) for part in body.parts), **corners,
         )  # fmt: skip
 
     def _placed_point(self, point) -> np.ndarray:
@@ -175,6 +175,11 @@ def _thinned(path: np.ndarray, share: float) -> np.ndarray:
     return path[np.unique(np.linspace(0, last, min(last + 1, PATH_POINTS)).round().astype(int))]
 
 
+def _scaled(part: BodyView, scale: float) -> BodyView:
+    """Part of a compound that is drawn `scale` times as large."""
+    return replace(part, pos=scale * part.pos, dimensions=scale * part.dimensions, corners=scale * part.corners)
+
+
 def _extent(body: BodyView) -> float:
     return float(body.dimensions.max() * (1.0 if body.kind == "block" else 2.0))
 
@@ -189,9 +194,3 @@ def _upright(scene: Scene) -> np.ndarray:
         return np.array((0.0, 1.0, 0.0, 0.0))
     half = np.concatenate(([1.0 + axis @ Y], np.cross(axis, Y)))
     return half / np.linalg.norm(half)
-
-
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Quaternion (4,), w first, of the rotation q followed by p."""
-    a, b, c, d = p.tolist()
-    return np.array(((a, -b, -c, -d), (b, a, -d, c), (c, d, a, -b), (d, -c, b, a))) @ q

@@ -11,7 +11,7 @@ from physics.compiler.decorators import entry_kernel
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
-from physics.world.wall_distance import lowest_reach
+from physics.world.wall_distance import REACHED, lowest_reach
 from physics.world.world import World
 
 
@@ -51,7 +51,7 @@ def write_wall_gaps(world: World, indices: np.ndarray, out: np.ndarray) -> None:
     """Write the gaps between all bodies and walls [m] into `out` (n, bodies, walls); negative where they overlap."""
     _wall_gaps(indices, world.state, world.params, world.shapes, world.walls, out)
     for b, body in enumerate(world.scene.bodies):
-        if body.kind in ("hull", "capsule"):
+        if body.kind in REACHED:
             normals, offsets = world.walls[:, at.WALL_NORMAL : at.WALL_NORMAL + 3], world.walls[:, at.WALL_OFFSET]
             sizes = world.params[indices * world.body_count + b, at.DIMENSIONS : at.DIMENSIONS + 3]
             reach = lowest_reach(body, world.quat[indices, b], sizes, normals)

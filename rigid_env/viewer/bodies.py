@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigid_env.rendering import Frame, palette
-from rigid_env.rendering.bodies import body_colour
+from rigid_env.rendering.frame import body_colour
 from rigid_env.viewer.scenery import Placement, vivid
 from rigid_env.viewer.shapes import Part, parts, shape_key
 
@@ -23,7 +23,7 @@ GHOST_OPACITY = 0.32
 
 @dataclass(frozen=True, eq=False)
 class _Batch:
-    """Bodies of one shape: their indices, and each part of the shape with its node of viser's scene."""
+    """Solids of one shape: their indices in `Frame.solids`, and each part of the shape with its node of the scene."""
 
     members: np.ndarray
     is_hull: bool
@@ -31,7 +31,7 @@ class _Batch:
 
 
 class Bodies:
-    """Solid bodies in viser's scene, or translucent ones for the ghost.
+    """Solid bodies in viser's scene, or translucent ones for the ghost; compounds as their convex parts.
 
     Parameters
     ----------
@@ -51,15 +51,16 @@ class Bodies:
     ):  # fmt: skip
         self._scene, self._root, self._placement = scene, root, placement
         self._is_ghost, self._added = is_ghost, added
-        self._keys, self._batches = None, []
+        self._keys, self._batches, self._owners = None, [], np.zeros(0, dtype=int)
 
     def show(self, frame: Frame, is_asleep=None) -> None:
         """Move the bodies to their poses in a `Frame`; sleeping bodies, flagged in `is_asleep` (bodies,), are paler."""
-        bodies = frame.bodies
+        bodies, self._owners = frame.solids.bodies, frame.owners
         keys = [shape_key(body) for body in bodies]
         count = len(bodies)
         colours = np.array([body_colour(body, k) for k, body in enumerate(bodies)]).reshape(count, 3)
         if is_asleep is not None and np.any(is_asleep):
+            is_asleep = np.asarray(is_asleep)[self._owners]
             colours[is_asleep] = np.rint((1.0 - ASLEEP_SHARE) * colours[is_asleep] + ASLEEP_SHARE * np.array(ASLEEP))
         pos, size, quat = (
             np.array([getattr(body, name) for body in bodies]).reshape(count, width)
@@ -96,7 +97,7 @@ class Bodies:
                 )  # fmt: skip
                 batch.nodes.append((part, node))
                 if self._added is not None:
-                    self._added(node, members)
+                    self._added(node, self._owners[members])
             self._batches.append(batch)
         self._keys = keys
 

@@ -11,6 +11,7 @@ import physics
 from physics import Contact, Event
 from physics.rotations import rotation_matrices
 from rigid_env.rendering import BodyView, Frame, WallView
+from rigid_env.rendering.compounds import part_views
 from rigid_env.viewer.copies import warm
 from rigid_env.viewer.interface import Can, Look, Subject
 from rigid_env.viewer.worlds import WorldSubject
@@ -199,4 +200,4 @@ def _view(body: physics.Body, pos: np.ndarray, quat: np.ndarray) -> BodyView:
     dimensions = 2.0 * body.dimensions if body.kind == "block" else body.dimensions
     outline = {} if body.kind != "hull" else {"corners": body.polyhedron.vertices, "faces": body.polyhedron.loops}
     centre = pos + rotation_matrices(quat) @ np.array(body.center)
-    return BodyView(body.kind, dimensions, centre, quat, **outline)
+    return BodyView(body.kind, dimensions, centre, quat, **outline, parts=part_views(body))

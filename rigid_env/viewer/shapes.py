@@ -150,16 +150,22 @@ def hit(body: BodyView, origin, direction) -> np.ndarray | None:
         Start of the ray [m], and its direction of any length, world frame.
     """
     origin, direction = np.asarray(origin, dtype=float), np.asarray(direction, dtype=float)
-    inside = _stay(body, body_point(body, origin), direction @ rotation_matrix(body.quat))
-    if inside is None or inside[1] < 0.0:
+    spans = _spans(body, origin, direction)
+    if not spans:
         return None
-    return origin + (inside[0] if inside[0] >= 0.0 else inside[1]) * direction
+    return origin + min(first if first >= 0.0 else last for first, last in spans) * direction
 
 
 def leave(body: BodyView, direction) -> np.ndarray:
-    """Point (3,) [m] where a ray from the centre of a body leaves it; the centre for a direction of zero length."""
-    found = hit(body, body.pos, direction) if np.any(direction) else None
-    return body.pos if found is None else found
+    """Point (3,) [m] where a ray from the centre of a body leaves it for good; the centre if the ray has no length."""
+    spans = _spans(body, body.pos, np.asarray(direction, dtype=float)) if np.any(direction) else []
+    return body.pos + max(last for _, last in spans) * direction if spans else body.pos
+
+
+def _spans(body: BodyView, origin, direction) -> list[tuple[float, float]]:
+    """First and last s >= 0 for which origin + s direction is in each convex part of a body that the ray meets."""
+    each = [_stay(s, body_point(s, origin), direction @ rotation_matrix(s.quat)) for s in body.solids]
+    return [span for span in each if span is not None and span[1] >= 0.0]
 
 
 def _stay(body: BodyView, origin, direction):

@@ -266,6 +266,31 @@ def test_a_world_of_hulls_is_drawn_where_they_are(renderer):
     assert (above.min(axis=0) >= corners.min(axis=0) - 2.0).all()
 
 
+def test_the_parts_of_a_compound_are_drawn_where_they_are_in_its_colour(renderer):
+    parts = [physics.Sphere(0.5, 1.0, pos=(x, 0, 0)) for x in (-1.5, 1.5)]
+    body = physics.Compound(parts, pos=(0, 2, 0), quat=(0.5**0.5, 0, 0, 0.5**0.5))
+    frame = world_frame(physics.World(physics.Scene([body])))
+    assert frame.solids is not frame
+    assert frame.owners.tolist() == [0, 0]
+    np.testing.assert_allclose([solid.pos for solid in frame.bodies[0].solids], [(0, 0.5, 0), (0, 3.5, 0)], atol=1e-12)
+    camera = renderer.camera(frame)
+    picture, empty = renderer.draw(frame).copy(), renderer.draw(without_bodies(frame, camera)).copy()
+    middles, _ = camera.project(np.array([solid.pos for solid in frame.bodies[0].solids]), SIZE)
+    changed = np.abs(picture.astype(int) - empty).max(axis=2) > 40
+    for x, y in middles.round().astype(int):
+        assert changed[y, x]
+    x, y = middles.mean(axis=0).round().astype(int)
+    assert not changed[y, x]
+    assert {solid.colour for solid in frame.solids.bodies} == {palette.BODIES[0]}
+
+
+def test_a_compound_needs_parts_and_no_other_shape_has_them():
+    ball = BodyView("sphere", (1, 1, 1), (0, 0, 0))
+    for wrong in (lambda: BodyView("compound", (1, 1, 1), (0, 0, 0)), lambda: replace(ball, parts=(ball,))):
+        with pytest.raises(ValueError, match="a compound alone must have parts"):
+            wrong()
+
+
 def test_block_faces_are_in_the_promised_order():
     signed_axes = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]])
     np.testing.assert_array_equal(MESHES["block"].normals, signed_axes)

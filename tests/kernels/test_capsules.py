@@ -14,8 +14,8 @@ from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.stepping.passing_pairs import _gap_along
-from physics.plan.plan import SHAPE_CODES
 from physics.rotations import rotation_matrices
+from physics.scene.parts import SHAPE_CODES
 from physics.scene.polyhedra import polyhedra
 from physics.world import parameters
 from tests.kernels.called import called

@@ -13,8 +13,8 @@ import physics
 from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
-from physics.plan.plan import SHAPE_CODES
 from physics.rotations import rotation_matrices
+from physics.scene.parts import SHAPE_CODES
 from physics.scene.polyhedra import polyhedra
 from tests.kernels.called import called
 

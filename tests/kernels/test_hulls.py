@@ -15,7 +15,7 @@ from physics.kernels.multibody.data.allocation import make_bodies_workspace
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.hull_tables import CUBE, make_hulls
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
-from physics.plan.plan import SHAPE_CODES
+from physics.scene.parts import SHAPE_CODES
 from physics.scene.polyhedra import polyhedra as polyhedra_of
 from physics.world import parameters
 from tests.kernels.called import called

@@ -165,7 +165,14 @@ REFUSED = {
         model(box(), world='<geom name="t" type="cylinder" size="1 1"/>'),
         "line 4: <geom 't'> is a fixed cylinder",
     ),
-    "two geoms": (model(box() + box()), "line 5: <body> has 2 geoms that can touch others"),
+    "two geoms": (
+        model(box() + box('name="b" friction=".3"')),
+        "line 5: <geom 'b'> differs in contact from another geom of its body",
+    ),
+    "mass elsewhere": (
+        of("", box() + box('pos=".5 0 0"') + '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'),
+        "<body> in a scene: the centre of mass of its 2 geoms is [0.25, 0.0, 0.0] m from that of the body",
+    ),
     "no geom": (of("", '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'), "<body> has 0 geoms"),
     "cylinder": (
         model('<geom type="cylinder" size=".1 .2"/>'),

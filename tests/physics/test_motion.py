@@ -11,10 +11,16 @@ from scipy.spatial.transform import Rotation
 
 import physics
 from tests.reference.driven import GRAVITY, BlockOnBelt, on_turntable
+from tests.tiers.sweep import sweep
 
 MU = 0.3
 LAWS = [physics.Gravity((0, -GRAVITY, 0)), physics.Contact(restitution=0.5), physics.Friction(MU)]
 BOX = physics.Block((0.4, 0.2, 0.3), 2.0, pos=(0, 0.1, 0))
+
+
+def at_balanced(case: tuple[str, float]) -> bool:
+    """Answer whether the default tier runs a case; `precise` has kernels that no other test of it needs."""
+    return case[0] == "balanced"
 
 
 def support(motion: physics.Motion, **given) -> physics.Block:
@@ -29,7 +35,7 @@ def world(motion: physics.Motion, box: physics.Block = BOX, preset: str = "balan
 
 
 @pytest.mark.parametrize("way", ["surface_velocity", "velocity"])
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 2e-6), ("precise", 1e-11)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 2e-6), ("precise", 1e-11)], at_balanced))
 def test_a_belt_carries_a_block_along(preset, bound, way):
     """Friction gives μ g until the block has the speed of the belt, whether the surface moves or the whole body.
 
@@ -47,7 +53,7 @@ def test_a_belt_carries_a_block_along(preset, bound, way):
     assert on_belt.report.ok or preset == "precise"  # some solves at the end of the slip keep a residual of 2e-10
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-7), ("precise", 1e-10)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 1e-7), ("precise", 1e-10)], at_balanced))
 def test_a_belt_reverses(preset, bound):
     """`set_motion` reverses the belt while the block still slips on it."""
     on_belt = world(physics.Motion(surface_velocity=(2, 0, 0)), preset=preset)
@@ -88,7 +94,7 @@ def shaker() -> tuple[physics.Motion, CubicSpline]:
     return physics.Motion.table(times, pos, repeat=True), CubicSpline(times, x, bc_type="periodic")
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-5), ("precise", 1e-10)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 1e-5), ("precise", 1e-10)], at_balanced))
 def test_a_block_drifts_on_a_shaker(preset, bound):
     """a ω² = 3 μ g: in each period the block slips both ways; its way after ten periods.
 
@@ -113,7 +119,7 @@ HOLDING_RADIUS = MU * GRAVITY / SPIN**2
 CHIP = {"size": (0.004, 0.001, 0.004), "mass": 0.1}
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 2e-5), ("precise", 1e-9)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 2e-5), ("precise", 1e-9)], at_balanced))
 def test_a_block_stays_on_a_turntable(preset, bound):
     """Within μ g/ω² it turns with the table. At `balanced` the angle is off by 4/3 (ω h/2)³ in each step: 6.7e-6 m."""
     radius, angle = 0.68 * HOLDING_RADIUS, SPIN * 0.5
@@ -126,7 +132,7 @@ def test_a_block_stays_on_a_turntable(preset, bound):
     np.testing.assert_allclose(on_table.angvel[0, :, 1], SPIN, atol=1e-5)
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 2e-5), ("precise", 1e-9)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 2e-5), ("precise", 1e-9)], at_balanced))
 def test_a_chip_slides_off_a_turntable(preset, bound):
     """Outside μ g/ω² a chip, small enough to be a point, slides outwards.
 
@@ -144,7 +150,7 @@ def test_a_chip_slides_off_a_turntable(preset, bound):
 # --- plates that push -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("preset", "bound"), [("balanced", 1e-5), ("precise", 1e-9)])
+@pytest.mark.parametrize(("preset", "bound"), sweep([("balanced", 1e-5), ("precise", 1e-9)], at_balanced))
 def test_a_rising_plate_bats_a_block(preset, bound):
     """A block that falls flat on a plate of velocity w leaves it with w + e (w - v): the plate's work is no error."""
     height, rise, e, time = 1.0, 1.5, 0.5, 0.6
@@ -158,6 +164,7 @@ def test_a_rising_plate_bats_a_block(preset, bound):
     assert falling.linvel[0, 1, 1] == pytest.approx(up - GRAVITY * left, abs=bound)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("ratio", [1e2, 1e5, 1e8])
 def test_a_plate_pushes_a_light_block_against_a_heavy_one(ratio):
     """All move with the plate at last, whatever the ratio of the masses; nothing overlaps."""

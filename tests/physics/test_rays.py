@@ -436,3 +436,13 @@ def test_a_result_of_another_size_is_refused():
     hits.normal.flags.writeable = False
     with pytest.raises(ValueError, match=r"out\.normal"):
         world.cast_rays((0, 0, 0), (1, 0, 0), out=hits)
+
+
+@pytest.mark.exhaustive
+def test_scenes_of_other_shapes_have_kernels_of_their_own():
+    """A kernel that knows no capsules, or no compounds, is not called for a scene that has them."""
+    rod = physics.Capsule(0.2, 1.0, 1.0)
+    for body in (physics.Sphere(0.7, 1.0), rod, physics.Compound([rod])):
+        world = physics.World(physics.Scene([body]))
+        hits = world.cast_rays([(0, 0.6, -5)], [(0, 0, 1)])
+        assert hits.hit.tolist() == [[0]], body

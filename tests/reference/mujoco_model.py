@@ -126,17 +126,24 @@ def _fixed_geoms(model) -> list[int]:
 
 
 def _shape_off(model, data, b: int, body, R: np.ndarray) -> float:
-    """Difference of the shape in its place: corners of a block or a hull, centre and axes of others."""
-    (geom,) = _able(model, _geoms(model, b))
+    """Difference of the shape in its place, of a compound the largest one of a part and its geom, in their order."""
+    geoms, pos = _able(model, _geoms(model, b)), np.array(body.pos)
+    placed = [(body, pos + R @ body.center, R)]
+    if body.kind == "compound":
+        placed = [(each.part, pos + R @ each.place, R @ each.R) for each in body.placed_parts]
+    return max(_part_off(model, data, g, *each) for g, each in zip(geoms, placed, strict=True))
+
+
+def _part_off(model, data, geom: int, body, here: np.ndarray, R: np.ndarray) -> float:
+    """Difference of a shape in its place: corners of a hull, centre and axes of others."""
     there, axes, size = data.geom_xpos[geom], data.geom_xmat[geom].reshape(3, 3), model.geom_size[geom]
-    here = np.array(body.pos) + R @ body.center
     scale = max(1.0, float(np.abs(there).max()))
     if body.kind == "hull":
         mesh = model.geom_dataid[geom]
         start = model.mesh_vertadr[mesh]
         points = there + model.mesh_vert[start : start + model.mesh_vertnum[mesh]] @ axes.T
-        corners = body.pos + body.polyhedron.vertices @ R.T
-        inside = ((points - body.pos) @ R @ body.polyhedron.normals.T).max(axis=0)
+        corners = here + body.polyhedron.vertices @ R.T
+        inside = ((points - here) @ R @ body.polyhedron.normals.T).max(axis=0)
         distance = (body.polyhedron.vertices @ body.polyhedron.normals.T).max(axis=0)
         near = np.linalg.norm(corners[:, None] - points[None], axis=2).min(axis=1).max()
         return float(max(near, np.abs(inside - distance).max()) / scale)

@@ -43,6 +43,32 @@ def depth(body, point) -> float:
     return float((np.sum(mesh.normals * (local - mesh.vertices[mesh.faces[:, 0]]), axis=1)).max())
 
 
+def compound(seed: int) -> BodyView:
+    """Two of the shapes of `crowd` beside each other, and a body that holds both."""
+    rng = np.random.default_rng(seed)
+    one, other = rng.choice(5, 2)
+    parts = [
+        replace(body, pos=(x, 0.0, 0.0)) for body, x in zip(np.array(crowd(5, rng), object)[[one, other]], (-2, 2))
+    ]
+    return BodyView("compound", (4.0, 2.0, 2.0), (1.0, 2.0, 3.0), (0.6, 0.0, 0.8, 0.0), parts=parts)
+
+
+@given(seeds, points)
+def test_a_ray_meets_the_nearest_part_of_a_compound(seed, origin):
+    body = compound(seed)
+    way = body.solids[seed % 2].pos - origin
+    found = [point for solid in body.solids if (point := hit(solid, origin, way)) is not None]
+    nearest = min(found, key=lambda point: np.linalg.norm(point - origin))
+    np.testing.assert_array_equal(hit(body, origin, way), nearest)
+
+
+def test_an_arrow_starts_where_it_leaves_the_last_part_of_a_compound():
+    body = compound(0)
+    along = world_point(body, (1.0, 0.0, 0.0)) - body.pos
+    np.testing.assert_allclose(leave(body, along), leave(body.solids[1], along), atol=1e-12)
+    np.testing.assert_array_equal(leave(body, np.zeros(3)), body.pos)
+
+
 @given(seeds, st.integers(0, 4), points)
 def test_a_ray_at_the_middle_meets_the_surface_on_its_side(seed, kind, origin):
     body = one_body(seed, kind)

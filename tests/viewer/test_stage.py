@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rigid_env.rendering import WallView
+from rigid_env.rendering import BodyView, WallView
 from tests.viewer.looks import BLOCK, busy_look, crowd, look_of
 
 pytest.importorskip("viser")
@@ -86,6 +86,18 @@ def test_bodies_of_one_shape_are_one_batch(stage, rng):
     members = [k for k, body in enumerate(bodies) if body.kind in ("sphere", "ellipsoid")]
     expected = stage.placement.drawn([bodies[k].pos for k in members])
     np.testing.assert_array_equal(positions, expected)
+
+
+def test_parts_of_compounds_are_drawn_as_solids_of_their_body(stage):
+    parts = (replace(BLOCK, pos=(0.0, 1.0, 0.0)), replace(BLOCK, pos=(0.0, -1.0, 0.0)))
+    whole = BodyView("compound", (3.0, 3.0, 3.0), (1.0, 5.0, 0.0), (0.6, 0.0, 0.0, 0.8), parts=parts)
+    stage.show(look_of([BLOCK, whole], is_asleep=np.array([False, True])))
+    blocks = node(stage, "/scene/bodies/0.0")
+    expected = stage.placement.drawn([BLOCK.pos, *(solid.pos for solid in whole.solids)])
+    np.testing.assert_allclose(blocks.batched_positions, expected, atol=1e-6)
+    awake, first, second = blocks.batched_colors.astype(int)
+    np.testing.assert_array_equal(first, second)
+    assert np.ptp(first) < 0.5 * np.ptp(awake)
 
 
 def test_a_later_look_moves_the_same_nodes(stage):

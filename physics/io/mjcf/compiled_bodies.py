@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
+from physics.io.mjcf.compounds import DENSITY, PlacedGeom, make_compound, make_fixed_compound
 from physics.io.mjcf.left_out import LeftOut
-from physics.io.mjcf.model import Model, Pose
-from physics.io.mjcf.shapes import Placed, make_body, make_fixed
+from physics.io.mjcf.model import ORIGIN, Model, Pose
+from physics.io.mjcf.shapes import Placed, make_body, make_fixed, make_part
 from physics.io.mjcf.text import ModelError
 from physics.io.mjcf.touching import Touching
 from physics.io.mjcf.writer import unnamed
@@ -38,7 +39,9 @@ class BodyElements(NamedTuple):
     body : Body
         Body of the scene.
     root, joint, geom : int
-        Numbers of the model's body, of its free joint, and of the geom that is its shape.
+        Numbers of the model's body, of its free joint, and of the geom that is its shape, of a compound the first one.
+    geoms : list of int
+        Numbers of all geoms of its shape.
     is_centred : bool
         Whether the joint is at the centre of mass.
     """
@@ -47,6 +50,7 @@ class BodyElements(NamedTuple):
     root: int
     joint: int
     geom: int
+    geoms: list[int]
     is_centred: bool
 
 
@@ -62,18 +66,48 @@ def free_bodies(model: Model, touching: Touching, left: LeftOut) -> list[BodyEle
 
 
 class FixedElement(NamedTuple):
-    """Fixed body of a scene, with the numbers of its body and its geom in the model."""
+    """Fixed body of a scene, with the numbers of its body, its geom (of a compound the first) and all its geoms."""
 
     root: int
     geom: int
+    geoms: list[int]
     body: Body
 
 
-def fixed_bodies(model: Model, geoms: list[int], left: LeftOut) -> list[FixedElement]:
+def fixed_bodies(model: Model, touching: Touching, geoms: list[int], left: LeftOut) -> list[FixedElement]:
     """Convert fixed geoms to fixed bodies; errors go to `left`.
 
-    A fixed body has the name of its geom, or that of the model's body if this has no other geom.
+    A fixed body has the name of its geom, or that of the model's body if this has no other geom. Several geoms of a
+    model's body, other than the world, are a compound, unless a geom has a name of its own or differs in contact.
     """
+    m, found = model.data, []
+    together: dict[int, list[int]] = {}
+    for geom in geoms:
+        together.setdefault(int(m.geom_bodyid[geom]), []).append(geom)
+    for root, members in together.items():
+        is_alike = all(touching.are_alike(members[0], geom) for geom in members)
+        if root > 0 and len(members) > 1 and is_alike and not any(model.name("geom", geom) for geom in members):
+            found += _fixed_compound(model, root, members, left)
+        else:
+            found += _fixed_geoms(model, members, left)
+    return found
+
+
+def _fixed_compound(model: Model, root: int, geoms: list[int], left: LeftOut) -> list[FixedElement]:
+    """Convert the fixed geoms of a model's body to a compound, whose frame is that of the body."""
+    frame, name = model.frames[root], model.name("body", root)
+    inner = [_placed_geom(model, geom, frame.inverse) for geom in geoms]
+    pose = np.concatenate((frame.pos, frame.quat))
+    try:
+        body = make_fixed_compound(inner, pose, None if name in ("", unnamed(root - 1)) else name)
+    except ValueError as error:
+        left.add(model.error("body", root, f"in a scene: {error}"))
+        return []
+    return [FixedElement(root, geoms[0], geoms, body)]
+
+
+def _fixed_geoms(model: Model, geoms: list[int], left: LeftOut) -> list[FixedElement]:
+    """Convert fixed geoms to fixed bodies, one each."""
     m, found = model.data, []
     for geom in geoms:
         root, frame = int(m.geom_bodyid[geom]), model.geom_frames[geom]
@@ -88,7 +122,7 @@ def fixed_bodies(model: Model, geoms: list[int], left: LeftOut) -> list[FixedEle
         pose = np.concatenate((frame.pos, capsule_frame(frame.quat) if kind == "capsule" else frame.quat))
         try:
             body = make_fixed(kind, shape, pose, None if name in ("", unnamed(root - 1)) else name)
-            found.append(FixedElement(root, geom, body))
+            found.append(FixedElement(root, geom, [geom], body))
         except ValueError as error:
             left.add(model.error("geom", geom, f"in a scene: {error}"))
     return found
@@ -115,12 +149,21 @@ def _free_roots(model: Model, left: LeftOut) -> Iterator[int]:
 def _free_body(model: Model, touching: Touching, root: int, number: int) -> BodyElements:
     m = model.data
     parts = parts_of(model, root)
-    geom, mass = _shape(model, touching, root, parts), _mass_properties(model, parts)
-    kind = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom])
-    if kind not in SHAPES:
-        raise model.error("geom", geom, f"is a {kind}; allowed of a free body are {', '.join(SHAPES)}")
-    frame, joint = model.geom_frames[geom], int(m.body_jntadr[root])
-    pose, velocity = _start(model, joint)
+    geoms, mass = _shape(model, touching, root, parts), _mass_properties(model, parts)
+    for geom in geoms:
+        kind = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom])
+        if kind not in SHAPES:
+            raise model.error("geom", geom, f"is a {kind}; allowed of a free body are {', '.join(SHAPES)}")
+    geom, joint = geoms[0], int(m.body_jntadr[root])
+    frame, (pose, velocity) = model.geom_frames[geom], _start(model, joint)
+    name: str | None = model.name("body", root)
+    name = None if name in ("", unnamed(number), unnamed(root - 1)) else name
+    if len(geoms) > 1:
+        try:
+            body: Body = make_compound([_placed_geom(model, each) for each in geoms], mass, pose, velocity, name)
+        except ValueError as error:
+            raise model.error("body", root, f"in a scene: {error}") from None
+        return BodyElements(body, root, joint, geom, geoms, not mass.centre.any())
     axes = frame.quat if kind in TURNED else np.array([1.0, 0.0, 0.0, 0.0])
     if kind == "capsule":
         axes = capsule_frame(frame.quat)
@@ -129,17 +172,34 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Body
         placed = Placed(kind, _points(model, geom), np.zeros(3), mass)
     else:
         placed = Placed(kind, _half_axes(kind, m.geom_size[geom]), T @ frame.pos, mass.placed(R=T))
-    name = model.name("body", root)
     try:
         body = make_body(
             placed,
             np.concatenate((pose[:3], product(pose[3:], axes))),
             np.concatenate((velocity[:3], T @ velocity[3:])),
-            None if name in ("", unnamed(number), unnamed(root - 1)) else name,
+            name,
         )
     except ValueError as error:
         raise model.error("body", root, f"in a scene: {error}") from None
-    return BodyElements(body, root, joint, geom, not mass.centre.any())
+    return BodyElements(body, root, joint, geom, geoms, not mass.centre.any())
+
+
+def _placed_geom(model: Model, geom: int, inner: Pose = ORIGIN) -> PlacedGeom:
+    """Geom of a body with several geoms, with the mass that the file states, or that of its density [kg].
+
+    `inner` is the pose of the frame of `model.geom_frames` in the frame of the result.
+    """
+    m, frame, spec = model.data, inner @ model.geom_frames[geom], model.spec("geom", geom)
+    kind, pos = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom]), frame.pos
+    quat = capsule_frame(frame.quat) if kind == "capsule" else frame.quat
+    if kind == "mesh":
+        shape, pos, quat = _points(model, geom), inner.pos, inner.quat
+    else:
+        shape = _half_axes(kind, m.geom_size[geom])
+    stated = np.nan if spec is None else float(spec.mass)
+    density = DENSITY if spec is None else float(spec.density)
+    part = make_part(kind, shape, pos, quat, {"mass": 1.0})
+    return PlacedGeom(kind, shape, pos, quat, density * part.volume if np.isnan(stated) else stated)
 
 
 def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
@@ -151,15 +211,17 @@ def _start(model: Model, joint: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(m.qpos0[q : q + 7]), np.zeros(6)
 
 
-def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> int:
-    """Number of the geom that is the shape of a body: the only one of its `parts` that can touch, or its only geom."""
+def _shape(model: Model, touching: Touching, root: int, parts: list[int]) -> list[int]:
+    """Numbers of the geoms that are the shape of a body: those of its `parts` that can touch, or all of them."""
     m = model.data
     geoms = np.flatnonzero(np.isin(m.geom_bodyid, parts)).tolist()
     able = [g for g in geoms if touching.may_touch(g)]
-    if len(able or geoms) != 1:
-        which = "geoms that can touch others" if able else "geoms"
-        raise model.error("body", root, f"has {len(able or geoms)} {which}, with all that is fixed to it; allowed is 1")
-    return (able or geoms)[0]
+    if not geoms:
+        raise model.error("body", root, "has 0 geoms, with all that is fixed to it; allowed is 1 or more")
+    for geom in able:
+        if not touching.are_alike(able[0], geom):
+            raise model.error("geom", geom, "differs in contact from another geom of its body; allowed are geoms alike")
+    return able or geoms
 
 
 def _mass_properties(model: Model, parts: list[int]) -> MassProperties:

@@ -47,7 +47,7 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
     surfaces = [touching.surface(each.geom) for each in free]
     met = _met_geoms(model, touching, dict.fromkeys(surfaces), left)
     planes = [geom for geom in met if _kind(model, geom) == "plane"]
-    fixed = fixed_bodies(model, [geom for geom in met if geom not in planes], left)
+    fixed = fixed_bodies(model, touching, [geom for geom in met if geom not in planes], left)
     order = sorted(range(len(free) + len(fixed)), key=[each.root for each in (*free, *fixed)].__getitem__)
     ends = [order.index(k) for k in range(len(order))]
     ends[len(free) : len(free)] = [-1 - k for k in range(len(planes))]
@@ -59,7 +59,7 @@ def read_scene(mujoco: ModuleType, text: str, root: Element, path: Path | None, 
     groups = [contact.groups.get(surface, {}) for surface in (*surfaces, *still[len(planes) :])]
     bodies = [replace((*free, *fixed)[k].body, friction=own[k], **groups[k]) for k in order]
     if contact.effects:
-        for error in touching.faults([*planes, *(each.geom for each in (*free, *fixed))]):
+        for error in touching.faults([*planes, *(geom for each in (*free, *fixed) for geom in each.geoms)]):
             left.add(error)
     walls = _walls(model, planes, contact, {body.name for body in bodies})
     if contact.groups:

@@ -12,19 +12,19 @@ import numpy as np
 
 from physics import validation
 from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
+from physics.io.mjcf.compounds import DENSITY, PlacedGeom, make_compound, make_fixed_compound
 from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.shapes import Placed, make_body, make_fixed, uniform_moments
 from physics.io.mjcf.text import Element, ModelError, label
 from physics.io.mjcf.writer import unnamed, wall_name
-from physics.mass.inertia import MassProperties, rotate
+from physics.mass.inertia import MassProperties, compose, rotate
 from physics.optional import INSTALLED_BY
 from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
 from physics.scene.effects import Gravity
 from physics.scene.scene import HalfSpace, Scene
 
-DENSITY = 1000.0  # MuJoCo's default [kg/m³]
 DEFAULT_GRAVITY = "0 0 -9.81"  # MuJoCo's default [m/s²]
 DEFAULT_FRICTION = "1 0.005 0.0001"  # MuJoCo's defaults for sliding, torsion and rolling
 
@@ -90,13 +90,14 @@ def read_scene(root: Element) -> Scene:
     gravity = _numbers(root if option is None else option, "gravity", 3, DEFAULT_GRAVITY)
     effects = [Gravity(gravity)] if gravity.any() else []
     pairs = _listed_pairs(root)
-    geoms = [*(element.find("geom") for element in elements), *planes]
-    names, told = [geom.get("name") for geom in geoms], {name for pair in pairs for name in pair}
+    groups_of_geoms = [*(element.findall("geom") for element in elements), *([plane] for plane in planes)]
+    names, told = _names(groups_of_geoms), {name for pair in pairs for name in pair}
+    geoms = [geoms[0] for geoms in groups_of_geoms]
     # only a listed geom has a number: surfaces of all others are equal if their properties are
-    surfaces = [_surface(geom, k if names[k] in told else -1) for k, geom in enumerate(geoms)]
+    surfaces = [_common_surface(geoms, k if told & set(names[k]) else -1) for k, geoms in enumerate(groups_of_geoms)]
 
     def friction_of(a: Surface, b: Surface) -> float | None:
-        listed = pairs.get(frozenset((names[a.geom], names[b.geom]))) if a.geom >= 0 and b.geom >= 0 else None
+        listed = _listed(pairs, names[a.geom], names[b.geom]) if a.geom >= 0 and b.geom >= 0 else None
         return dynamic_friction(a, b) if listed is None else listed
 
     free = [b for b, moves in enumerate(is_free) if moves]
@@ -116,6 +117,33 @@ def read_scene(root: Element) -> Scene:
     taken = {body.name for body in bodies}
     half_spaces = [replace(_wall(k, geoms[wall], own.get(wall), taken), **groups[wall]) for k, wall in enumerate(walls)]
     return Scene(bodies, half_spaces, effects + contact.effects)
+
+
+def _names(groups: list[list[Element]]) -> list[list[str | None]]:
+    return [[geom.get("name") for geom in geoms] for geoms in groups]
+
+
+def _listed(pairs: dict[frozenset[str], float], first: list, second: list) -> float | None:
+    """Friction that is listed for the geoms of two bodies, given by their names; None: none is listed.
+
+    Raises
+    ------
+    ModelError
+        The list says different things about the geoms of a body.
+    """
+    found = {pairs.get(frozenset((a, b))) for a in first for b in second}
+    if len(found) > 1:
+        raise ModelError(f"<pair> elements of the geoms {first} and {second} differ; allowed is the same for a body", 0)
+    return found.pop()
+
+
+def _common_surface(geoms: list[Element], number: int) -> Surface:
+    """Contact properties of the geoms of a body, which must be equal."""
+    found = [_surface(geom, number) for geom in geoms]
+    for geom, surface in zip(geoms, found):
+        if surface != found[0]:
+            raise _unread(geom, "differs in contact from another geom of its body; allowed are geoms alike")
+    return found[0]
 
 
 def _listed_pairs(root: Element) -> dict[frozenset[str], float]:
@@ -262,24 +290,53 @@ def _has_joint(element: Element) -> bool:
 
 def _fixed_body(b: int, element: Element, meshes: dict) -> Body:
     """Make a fixed body from body element number `b`, which has no joint."""
+    pose, name = np.concatenate((_numbers(element, "pos", 3, "0 0 0"), _unit(element))), _name(b, element)
+    if len(element.findall("geom")) > 1:
+        try:
+            return make_fixed_compound(_placed_geoms(element, meshes), pose, name)
+        except ValueError as error:
+            raise _error(element, f"in a scene: {error}") from None
     geom, kind, shape = _only_geom(element, meshes)
-    pose = np.concatenate((_numbers(element, "pos", 3, "0 0 0"), _unit(element)))
     arm = _numbers(geom, "pos", 3, "0 0 0")
     pose[:3] += rotation_matrices(pose[3:]) @ arm
     if kind == "capsule":
         pose[3:] = product(pose[3:], capsule_frame(_unit(geom)))
-    name = element.get("name")
     try:
-        return make_fixed(kind, shape, pose, None if name in (None, "", unnamed(b)) else name)
+        return make_fixed(kind, shape, pose, name)
     except ValueError as error:
         raise _error(element, f"in a scene: {error}") from None
 
 
+def _name(b: int, element: Element) -> str | None:
+    """Name of body element number `b`, None if it has none or one that the writer gives."""
+    name = element.get("name")
+    return None if name in (None, "", unnamed(b)) else name
+
+
+def _placed_geoms(element: Element, meshes: dict) -> list[PlacedGeom]:
+    """Geoms of a body element that has several, each with its mass."""
+    found = []
+    for geom in element.findall("geom"):
+        kind = _type(geom)
+        if kind not in SHAPES:
+            raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
+        _refuse(geom, "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
+        shape, quat = _points(geom, meshes) if kind == "mesh" else _half_axes(geom), _unit(geom)
+        turn = capsule_frame(quat) if kind == "capsule" else quat
+        mass = 0.0
+        if kind == "mesh" and geom.get("mass") is not None:
+            mass = float(_numbers(geom, "mass", 1)[0])
+        elif kind != "mesh":
+            mass = _mass_of(geom, kind, shape)
+        found.append(PlacedGeom(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), turn, mass))
+    return found
+
+
 def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray]:
-    """Find the only geom of a body element: the geom, its kind, and its half axes or points [m]."""
+    """Find the only geom of a body element that has at most one: the geom, its kind, its half axes or points [m]."""
     geoms = element.findall("geom")
     if len(geoms) != 1:
-        raise _unread(element, f"has {len(geoms)} geoms; allowed is one")
+        raise _unread(element, "has 0 geoms; allowed is one or more")
     geom, kind = geoms[0], _type(geoms[0])
     if kind not in SHAPES:
         raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
@@ -297,6 +354,13 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
     joints = element.findall("freejoint") + [j for j in element.findall("joint") if j.get("type") == "free"]
     if len(joints) != 1 or len(element.findall("joint")) + len(element.findall("freejoint")) != 1:
         raise _unread(element, "is not a free body; allowed is one freejoint and no other")
+    name = _name(b, element)
+    if len(element.findall("geom")) > 1:
+        geoms = _placed_geoms(element, meshes)
+        try:
+            return make_compound(geoms, _mass_of_several(element, geoms), pose, velocity, name)
+        except ValueError as error:
+            raise _error(element, f"in a scene: {error}") from None
     geom, kind, shape = _only_geom(element, meshes)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
     if kind == "capsule":
@@ -305,9 +369,8 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
         placed = placed._replace(pos=T @ placed.pos, mass=placed.mass.placed(R=T))
         pose = np.concatenate((pose[:3], product(pose[3:], axes)))
         velocity = np.concatenate((velocity[:3], T @ velocity[3:]))
-    name = element.get("name")
     try:
-        return make_body(placed, pose, velocity, None if name in (None, "", unnamed(b)) else name)
+        return make_body(placed, pose, velocity, name)
     except ValueError as error:
         raise _error(element, f"in a scene: {error}") from None
 
@@ -332,8 +395,27 @@ def _half_axes(geom: Element) -> np.ndarray:
 def _mass_properties(element: Element, geom: Element, shape: np.ndarray) -> MassProperties:
     """Mass, centre of mass and inertia tensor of a body element, in its frame; from its geom if it states none."""
     inertial = element.find("inertial")
-    if inertial is None:
-        return _of_geom(geom, shape)
+    return _of_geom(geom, shape) if inertial is None else _stated(inertial)
+
+
+def _mass_of_several(element: Element, geoms: list[PlacedGeom]) -> MassProperties:
+    """Mass properties of a body element with several geoms, in its frame; those of its geoms if it states none."""
+    inertial = element.find("inertial")
+    if inertial is not None:
+        return _stated(inertial)
+    for geom in geoms:
+        if geom.kind == "mesh":
+            raise _unread(element, "has a mesh, and no <inertial>; allowed is a body with it")
+    return compose([
+        MassProperties(g.mass, np.zeros(3), np.diag(uniform_moments(g.kind, g.shape, g.mass))).placed(
+            g.pos, rotation_matrices(g.quat)
+        )
+        for g in geoms
+    ])  # fmt: skip
+
+
+def _stated(inertial: Element) -> MassProperties:
+    """Mass properties that an element <inertial> states, in the frame of its body."""
     R = rotation_matrices(_unit(inertial))
     if inertial.get("fullinertia") is not None:
         _refuse(inertial, "diaginertia", "quat")
@@ -350,6 +432,15 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
     if _type(geom) == "mesh":
         raise _unread(geom, "is a mesh of a body without <inertial>; allowed is a body with it")
     kind = _type(geom)
+    mass = _mass_of(geom, kind, shape)
+    inertia = np.diag(uniform_moments(kind, shape, mass))
+    if kind == "capsule":
+        inertia = rotate(inertia, rotation_matrices(capsule_frame(_unit(geom))))
+    return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), inertia)
+
+
+def _mass_of(geom: Element, kind: str, shape: np.ndarray) -> float:
+    """Mass of a geom that is no mesh [kg], stated or that of its density."""
     if geom.get("mass") is not None:
         mass = float(_numbers(geom, "mass", 1)[0])
     else:
@@ -359,10 +450,7 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
         mass = volume * float(_numbers(geom, "density", 1, str(DENSITY))[0])
     if not mass > 0:
         raise _error(geom, f"has the mass {mass:g}; allowed is more than 0")
-    inertia = np.diag(uniform_moments(kind, shape, mass))
-    if kind == "capsule":
-        inertia = rotate(inertia, rotation_matrices(capsule_frame(_unit(geom))))
-    return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), inertia)
+    return mass
 
 
 def _condim(element: Element, default: int) -> int:

@@ -61,17 +61,22 @@ def make_body(placed: Placed, pose: np.ndarray, velocity: np.ndarray, name: str 
     ValueError
         A scene cannot hold such a body; the message names the reason.
     """
-    R, centre = rotation_matrices(pose[3:]), placed.mass.centre
-    start = {
-        "pos": pose[:3] + R @ centre,
-        "quat": pose[3:],
-        "linvel": velocity[:3] + R @ np.cross(velocity[3:], centre),
-        "angvel": R @ velocity[3:],
-        "name": name,
-    }
+    start = start_of(placed.mass, pose, velocity, name)
     if placed.kind == "mesh":
         return _hull(placed, start)
     return _convex(placed, start)
+
+
+def start_of(mass: MassProperties, pose: np.ndarray, velocity: np.ndarray, name: str | None) -> dict[str, Any]:
+    """Start of a body of a scene, and its name; `mass` has the centre of mass. Arguments are those of `make_body`."""
+    R = rotation_matrices(pose[3:])
+    return {
+        "pos": pose[:3] + R @ mass.centre,
+        "quat": pose[3:],
+        "linvel": velocity[:3] + R @ np.cross(velocity[3:], mass.centre),
+        "angvel": R @ velocity[3:],
+        "name": name,
+    }
 
 
 def make_fixed(kind: str, shape: np.ndarray, pose: np.ndarray, name: str | None) -> Body:
@@ -79,14 +84,22 @@ def make_fixed(kind: str, shape: np.ndarray, pose: np.ndarray, name: str | None)
 
     The points of a mesh are relative to the origin of `pose`.
     """
-    start: dict[str, Any] = {"quat": pose[3:], "name": name, "fixed": True}
+    return make_part(kind, shape, pose[:3], pose[3:], {"name": name, "fixed": True})
+
+
+def make_part(kind: str, shape: np.ndarray, pos: np.ndarray, quat: np.ndarray, given: dict[str, Any]) -> Body:
+    """Make a body of a geom of uniform density at `pos` [m], of attitude `quat`, with other arguments `given`.
+
+    `shape` is as in `Placed`; the points of a mesh are relative to `pos`, along the axes of `quat`.
+    """
+    start: dict[str, Any] = {"quat": quat, **given}
     if kind == "mesh":
         fault = _hull_fault(points := tuple(map(tuple, shape.tolist())))
         if fault:
             raise ValueError(fault)
         hull = Hull(points, **start)
-        return replace(hull, pos=pose[:3] + rotation_matrices(pose[3:]) @ hull.centroid)
-    start["pos"] = pose[:3]
+        return replace(hull, pos=pos + rotation_matrices(quat) @ hull.centroid)
+    start["pos"] = pos
     if kind == "box":
         return Block(tuple(2 * shape), **start)
     if kind == "capsule":
@@ -104,7 +117,7 @@ def uniform_moments(kind: str, shape: np.ndarray, mass: float) -> np.ndarray:
 def _convex(placed: Placed, start: dict[str, Any]) -> Body:
     """Make a body that is no hull; `inertia_body` is given if the inertia is not that of uniform density."""
     half, mass, arm = placed.shape, placed.mass.mass, placed.pos - placed.mass.centre
-    is_uniform = _is_near(placed.mass.inertia, np.diag(uniform_moments(placed.kind, half, mass)), UNIFORM)
+    is_uniform = is_near(placed.mass.inertia, np.diag(uniform_moments(placed.kind, half, mass)), UNIFORM)
     if (is_uniform or placed.kind != "box") and _is_rounding(arm, placed):
         arm = np.zeros(3)
     if arm.any() or not is_uniform:
@@ -138,7 +151,7 @@ def _hull(placed: Placed, start: dict[str, Any]) -> Body:
             f"the centre of mass of its mesh's convex hull is {away.tolist()} m from that of the body; allowed is a "
             "convex mesh of uniform density"
         )
-    if _is_near(placed.mass.inertia, hull.inertia, UNIFORM_HULL):
+    if is_near(placed.mass.inertia, hull.inertia, UNIFORM_HULL):
         return hull
     return Hull(points, mass, **start, inertia_body=placed.mass.inertia)
 
@@ -153,5 +166,6 @@ def _hull_fault(points: tuple) -> str:
     return ""
 
 
-def _is_near(tensor: np.ndarray, uniform: np.ndarray, share: float) -> bool:
+def is_near(tensor: np.ndarray, uniform: np.ndarray, share: float) -> bool:
+    """True if two inertia tensors differ by at most `share` of the largest moment of `uniform`."""
     return bool(np.abs(tensor - uniform).max() <= share * np.diag(uniform).max())

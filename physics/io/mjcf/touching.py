@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,6 +53,17 @@ class Touching:
             int(m.geom_priority[geom]),
             geom if geom in self._special else -1,
         )
+
+    def are_alike(self, first: int, second: int) -> bool:
+        """True if two geoms have the same contact properties, in the model's list of pairs, too."""
+        a, b = (self.surface(geom) for geom in (first, second))
+        return replace(a, geom=b.geom) == b and self._partners(first) == self._partners(second)
+
+    def _partners(self, geom: int) -> dict[int, tuple]:
+        """Numbers of the geoms with which a pair of the list names this one, and the pair's properties."""
+        m = self._model.data
+        found = {pair: k for pair, k in self._pairs.items() if geom in pair}
+        return {min(pair - {geom}): (int(m.pair_dim[k]), float(m.pair_friction[k, 0])) for pair, k in found.items()}
 
     def friction_of(self, a: Surface, b: Surface) -> float | None:
         """Friction coefficient of two surfaces; None if they do not touch."""

@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Container
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from physics.io.mjcf.capsule_frames import OF_GEOM
 from physics.io.mjcf.surfaces import Frictions
+from physics.rotations import product as quaternion_product
 from physics.rotations import rotation_matrices
+from physics.scene.bodies import Body
+from physics.scene.compound import Compound, PlacedPart
 from physics.scene.effects import Contact, Friction, Gravity
 from physics.scene.force_fields import Spring
 from physics.scene.groups import assign_groups, touching_pairs
@@ -52,6 +56,12 @@ def geom_name(b: int) -> str:
     return f"geom{b}"
 
 
+def geom_names(b: int, body: Body) -> list[str]:
+    """Names in MJCF of the geoms of body number `b` of a scene: one, or one for each part of a compound."""
+    parts = body.parts if isinstance(body, Compound) else ()
+    return [f"{geom_name(b)}.{k}" for k in range(len(parts))] or [geom_name(b)]
+
+
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
     """Make the MJCF text of a scene; see `save_mjcf` for its contents and for `drop`."""
     lost = _inexpressible(scene)
@@ -77,9 +87,8 @@ def to_mjcf(scene: Scene, drop: bool = False) -> str:
     _check_names(scene)
     for b, body in enumerate(scene.bodies):
         surface = _surface(frictions.bodies[b], frictions)
-        if pairs:
-            surface["name"] = geom_name(b)
-        _add_body(world, b, body, touch[b], surface, springs)
+        names = geom_names(b, body) if pairs else []
+        _add_body(world, b, body, names, {**touch[b], **surface}, springs)
     if pairs:
         _add_pairs(root, scene, pairs)
     if springs:
@@ -94,7 +103,7 @@ def _check_names(scene: Scene) -> None:
     for kind, items, name_of in (("bodies", scene.bodies, unnamed), ("walls", scene.walls, unnamed_wall)):
         taken = {name_of(k): k for k, item in enumerate(items) if item.name is None}
         if kind == "walls":
-            taken.update({geom_name(b): b for b in range(len(scene.bodies))})
+            taken.update({name: b for b, body in enumerate(scene.bodies) for name in geom_names(b, body)})
         for k, item in enumerate(items):
             if item.name in taken:
                 raise ValueError(
@@ -108,17 +117,27 @@ def _add_pairs(root: ET.Element, scene: Scene, pairs: list[tuple[int, int, float
     element = ET.SubElement(root, "contact")
     for body, other, mu in pairs:
         wall = -1 - other
-        second = geom_name(other) if other >= 0 else scene.walls[wall].name or unnamed_wall(wall)
+        if other >= 0:
+            seconds = geom_names(other, scene.bodies[other])
+        else:
+            seconds = [scene.walls[wall].name or unnamed_wall(wall)]
         friction: Any = {"condim": "3", "friction": _text((mu, mu, 0, 0, 0))} if mu > 0 else {"condim": "1"}
-        ET.SubElement(element, "pair", geom1=geom_name(body), geom2=second, **friction)
+        for first, second in product(geom_names(body, scene.bodies[body]), seconds):
+            ET.SubElement(element, "pair", geom1=first, geom2=second, **friction)
 
 
 def _add_meshes(root: ET.Element, scene: Scene) -> None:
-    """Add a mesh element for each hull, with its corners relative to its centre of mass."""
-    hulls: dict[str, Any] = {f"hull{b}": body for b, body in enumerate(scene.bodies) if body.kind == "hull"}
+    """Add a mesh element for each hull, also in a compound, with its corners relative to its centre of mass."""
+    named = [(f"hull{b}{k}", part) for b, body in enumerate(scene.bodies) for k, part in _numbered_parts(body)]
+    hulls: dict[str, Any] = {name: part for name, part in named if part.kind == "hull"}
     assets: Any = ET.SubElement(root, "asset") if hulls else None
     for name, body in hulls.items():
         ET.SubElement(assets, "mesh", name=name, vertex=_text(body.polyhedron.vertices))
+
+
+def _numbered_parts(body: Body) -> list[tuple[str, Body]]:
+    """Parts of a compound, each with the end of its name in MJCF; of another body the body alone."""
+    return [(f".{k}", part) for k, part in enumerate(body.parts)] if isinstance(body, Compound) else [("", body)]
 
 
 def _inexpressible(scene: Scene) -> list:
@@ -178,10 +197,11 @@ def _masks(scene: Scene) -> list[dict[str, str]]:
     return [{"contype": str(group), "conaffinity": str(mask)} for group, mask in found]
 
 
-def _add_body(world: ET.Element, b: int, body, touch: dict, surface: dict, springs: list[Spring]) -> None:
+def _add_body(world: ET.Element, b: int, body, names: list[str], surface: dict, springs: list[Spring]) -> None:
     """Add the element of body number `b` in the frame of the scene's body, and sites for its springs.
 
-    `touch` holds the masks of its geom. A fixed body has no joint.
+    `names` are those of its geoms, if any are named; `surface` holds their properties in contact. A fixed body has no
+    joint.
     """
     element = ET.SubElement(world, "body", name=body.name or unnamed(b), pos=_text(body.pos), quat=_text(body.quat))
     if not body.fixed:
@@ -189,17 +209,38 @@ def _add_body(world: ET.Element, b: int, body, touch: dict, surface: dict, sprin
         I = body.inertia
         full = _text((I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]))
         ET.SubElement(element, "inertial", pos="0 0 0", mass=_text(body.mass), fullinertia=full)
-    size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
-    extent = {"mesh": f"hull{b}"} if body.kind == "hull" else {"size": _text(size)}
-    if body.kind == "capsule":
-        extent = {"size": _text((body.radius, 0.5 * body.length)), "quat": _text(OF_GEOM)}
-    shape: Any = {"type": GEOMS[body.kind], **extent, "pos": _text(body.center)}
-    ET.SubElement(element, "geom", **shape, **touch, **surface)
+    if isinstance(body, Compound):
+        shapes = [_part(placed, f"hull{b}.{k}") for k, placed in enumerate(body.placed_parts)]
+    else:
+        shapes = [_shape(body, f"hull{b}", np.array(body.center))]
+    for k, shape in enumerate(shapes):
+        name: Any = {"name": names[k]} if names else {}
+        ET.SubElement(element, "geom", **shape, **surface, **name)
     for k, spring in enumerate(springs):
         if spring.body == b:
             ET.SubElement(element, "site", name=f"point{k}", pos=_text(spring.point))
         if spring.other == b:
             ET.SubElement(element, "site", name=f"anchor{k}", pos=_text(spring.anchor))
+
+
+def _shape(body, mesh: str, pos: np.ndarray, quat: np.ndarray | None = None) -> dict[str, str]:
+    """Attributes of the geom of a body or part at `pos` [m], of attitude `quat` (None: that of the body).
+
+    `mesh` is the name of its mesh, if it is a hull.
+    """
+    size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
+    extent = {"mesh": mesh} if body.kind == "hull" else {"size": _text(size)}
+    if body.kind == "capsule":
+        extent = {"size": _text((body.radius, 0.5 * body.length))}
+        quat = OF_GEOM if quat is None else quaternion_product(quat, OF_GEOM)
+    turn = {} if quat is None else {"quat": _text(quat)}
+    return {"type": GEOMS[body.kind], **extent, **turn, "pos": _text(pos)}
+
+
+def _part(placed: PlacedPart, mesh: str) -> dict[str, str]:
+    """Attributes of the geom of a part of a compound, with its mass, from which a reader finds the centre of mass."""
+    mass = {} if placed.part.fixed else {"mass": _text(placed.part.mass)}
+    return {**_shape(placed.part, mesh, placed.place, np.array(placed.part.quat)), **mass}
 
 
 def _add_springs(root: ET.Element, world: ET.Element, springs: list[Spring]) -> None:

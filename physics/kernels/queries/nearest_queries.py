@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
+from physics.kernels.multibody.data.parts import is_compound
 from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.queries.nearest_points import nearest_of_bodies, nearest_to_wall
 from physics.kernels.queries.query_scratch import bounding_radius, pose_world
@@ -59,6 +60,48 @@ def _write(row, code, nearest, found):
     put_vector(found.other_point, row, 0, nearest[3])
 
 
+@inlined
+def _parts(b, scratch):
+    """First part of body b and the end of its parts; of any other shape the shape alone."""
+    if is_compound(b, scratch):
+        return scratch.bodies.parts.span[b, 0], scratch.bodies.parts.span[b, 1]
+    return b, b + 1
+
+
+def _nearest_of_two(a, b, scratch):
+    return nearest_of_bodies(a, b, scratch)
+
+
+@if_given("scratch.bodies.parts", _nearest_of_two)
+def _nearest(a, b, scratch):
+    """Nearest points of bodies a and b, of all parts of compounds: (gap, n, p, q) as of `nearest_points`."""
+    first, last = _parts(a, scratch)
+    start, end = _parts(b, scratch)
+    best = nearest_of_bodies(first, start, scratch)
+    for part in range(first, last):
+        for other in range(start, end):
+            found = nearest_of_bodies(part, other, scratch)
+            if found[0] < best[0]:
+                best = found
+    return best
+
+
+def _nearest_to_its_wall(a, wall, scratch):
+    return nearest_to_wall(a, wall, scratch)
+
+
+@if_given("scratch.bodies.parts", _nearest_to_its_wall)
+def _nearest_wall_point(a, wall, scratch):
+    """Nearest points of body a, of all parts of a compound, and a wall: (gap, n, p, q) as of `nearest_points`."""
+    first, last = _parts(a, scratch)
+    best = nearest_to_wall(first, wall, scratch)
+    for part in range(first, last):
+        found = nearest_to_wall(part, wall, scratch)
+        if found[0] < best[0]:
+            best = found
+    return best
+
+
 @kernel
 def measure_pairs_of_world(k, indices, bodies, scratch, pairs, found):
     """Find the nearest points of all pairs in the k-th of the worlds `indices`."""
@@ -66,9 +109,9 @@ def measure_pairs_of_world(k, indices, bodies, scratch, pairs, found):
     for r in range(pairs.first.shape[0]):
         a, b = pairs.first[r], pairs.second[r]
         if b < 0:
-            nearest = nearest_to_wall(a, -1 - b, scratch)
+            nearest = _nearest_wall_point(a, -1 - b, scratch)
         else:
-            nearest = nearest_of_bodies(a, b, scratch)
+            nearest = _nearest(a, b, scratch)
         _write(k * pairs.first.shape[0] + r, b, nearest, found)
 
 
@@ -103,7 +146,7 @@ def _nearest_to_probe(probe, count, max_distance, exclude, scratch):
     best, code = (math.inf, none, none, none), NOTHING
     for b in range(count):
         if b != exclude and not _is_beyond(probe, b, min(best[0], max_distance), scratch):
-            found = nearest_of_bodies(probe, b, scratch)
+            found = _nearest(probe, b, scratch)
             if found[0] <= max_distance and found[0] < best[0]:
                 best, code = found, b
     for wall in range(scratch.walls.shape[0]):
@@ -117,11 +160,11 @@ def _nearest_to_probe(probe, count, max_distance, exclude, scratch):
 def probe_world(k, indices, bodies, scratch, probe, found):
     """Find the nearest body or wall to the probe in each of its poses, in the k-th of the worlds `indices`."""
     pose_world(indices[k], bodies, scratch)
-    count = bodies.shapes.shape[0]
+    count, row = bodies.shapes.shape[0], scratch.bodies.body.shape[0] - 1
     for r in range(probe.count):
         place = k * probe.pos_rows[0] + r * probe.pos_rows[1]
-        _pose_probe(count, place, k * probe.quat_rows[0] + r * probe.quat_rows[1], probe, scratch)
-        code, nearest = _nearest_to_probe(count, count, probe.max_distance, probe.exclude, scratch)
+        _pose_probe(row, place, k * probe.quat_rows[0] + r * probe.quat_rows[1], probe, scratch)
+        code, nearest = _nearest_to_probe(row, count, probe.max_distance, probe.exclude, scratch)
         _write(k * probe.count + r, code, nearest, found)
 
 

@@ -17,17 +17,29 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import plus, row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.data.hull_tables import Hulls, make_hulls
+from physics.kernels.multibody.data.parts import (
+    Part,
+    Parts,
+    is_compound,
+    make_parts,
+    place_parts,
+    write_part_records,
+)
 from physics.kernels.queries.box_tree import BoxTree, make_box_tree
 from physics.kernels.state import layout as at
 
 
 class PosedBodies(NamedTuple):
-    """Bodies of a world in their present poses, a row for each body, and one for a shape that is compared with them."""
+    """Bodies of a world in their present poses, a row for each body, and one for a shape that is compared with them.
+
+    The parts of compounds have rows behind all bodies, before that of the shape.
+    """
 
     body: np.ndarray  # (bodies,) records: shape code, half edges or semi-axes [m], bounding radius about `center` [m]
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
     rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
     capsules: bool | None  # None if neither a body nor the shape is a capsule
+    parts: Parts | None  # None without compounds
 
 
 class PairScratch(NamedTuple):
@@ -58,7 +70,9 @@ class QueriedBodies(NamedTuple):
     shapes: np.ndarray  # (bodies,) codes of shapes
 
 
-def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence, capsules: bool | None) -> QueryScratch:
+def make_query_scratch(
+    bodies: int, walls: np.ndarray, polyhedra: Sequence, capsules: bool | None, parts: Sequence[Part] = ()
+) -> QueryScratch:
     """Allocate the scratch memory of one thread.
 
     Parameters
@@ -68,18 +82,21 @@ def make_query_scratch(bodies: int, walls: np.ndarray, polyhedra: Sequence, caps
     walls : (walls, WALL_SIZE) float64
         Table of the walls.
     polyhedra : sequence
-        Polyhedron of each body as `hull_tables.make_hulls` takes them, of blocks, too; None for a round body. Further
-        ones are those of shapes that are no bodies of the world.
+        Polyhedron of each body and part as `hull_tables.make_hulls` takes them, of blocks, too; None for a round body.
+        The last one is that of a shape that is no body of the world.
     capsules : True or None
         Whether some of these bodies and shapes are capsules.
+    parts : sequence of Part
+        Parts of the compounds, sorted by their bodies.
     """
     rows = len(polyhedra)
     records = np.zeros(rows, np.dtype([("shape", np.int64), ("dims", np.float64, (3,)), ("radius", np.float64)]))
     hulls = make_hulls(polyhedra)
+    write_part_records(records, bodies, parts)
     return QueryScratch(
-        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9)), capsules),
+        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9)), capsules, make_parts(bodies, parts)),
         PairScratch(*(np.zeros((4, 3)) for _ in range(4)), hulls, _face_offsets(hulls)),
-        make_box_tree(bodies),
+        make_box_tree(bodies + len(parts)),
         walls.copy(),
     )
 
@@ -118,6 +135,9 @@ def pose_body(b, i, shape, bodies, scratch):
         posed.rotation[b, c] = R[c]
     arm = qt.matvec(R, row_vector(bodies.params, i, at.CENTER))
     put_vector(posed.center, b, 0, plus(row_vector(bodies.state, i, at.POS), arm))
+    if is_compound(b, scratch):
+        body.radius = bodies.params[i, at.RADIUS]
+    place_parts(b, scratch)
 
 
 @kernel

@@ -13,6 +13,7 @@ from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
 from physics.kernels.multibody.data.hull_tables import FIRST_FACE, LAST_FACE
+from physics.kernels.multibody.data.parts import body_of, is_compound
 from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.queries.box_tree import build_tree, find_bodies, safe_inverse
 from physics.kernels.queries.query_scratch import pose_world
@@ -56,7 +57,9 @@ class Hits(NamedTuple):
 
 @kernel
 def _ray_body(b, o, d, scratch):
-    """First point of a ray on body b: (t [m], normal, world frame)."""
+    """First point of a ray on a body or part b: (t [m], normal, world frame); of a compound its parts have it."""
+    if is_compound(b, scratch):
+        return math.inf, (0.0, 0.0, 0.0)
     arm, R = minus(o, row_vector(scratch.bodies.center, b, 0)), row_matrix(scratch.bodies.rotation, b)
     shape, dims = scratch.bodies.body[b].shape, scratch.bodies.body[b].dims
     if shape == SPHERE:
@@ -96,9 +99,10 @@ def cast_ray(o, d, farthest, exclude, scratch):
     rows = tree.child.shape[0]
     first, end = find_bodies(o, inverse, best, tree)
     for k in range(first, end):
-        b = tree.item[k] - rows
+        part = tree.item[k] - rows
+        b = body_of(part, scratch)
         if b != exclude and not tree.distance[k] > best:
-            t, n = _ray_body(b, o, d, scratch)
+            t, n = _ray_body(part, o, d, scratch)
             if t < best or (t == best and t < math.inf and (code < 0 or b < code)):
                 best, code, normal = t, b, n
     return (math.inf if code == NOTHING else best), code, normal

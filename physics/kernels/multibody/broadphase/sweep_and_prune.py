@@ -20,6 +20,7 @@ from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 from physics.kernels.multibody.data.fixed_bodies import may_form_pair
+from physics.kernels.multibody.data.parts import is_compound
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
 # Bound of the factor by which growing spin moves points farther than the initial spin would (`surface_motion_bound`).
@@ -79,13 +80,16 @@ def may_meet(a, b, h, many):
 
 @inlined
 def half_extent(b, axis, many):
-    """Half the width of body b along a world axis (0, 1 or 2) [m]; for a hull, half the width of its bounding block."""
+    """Half the width of body b along a world axis (0, 1 or 2) [m].
+
+    For a hull or compound it is half the width of the bounding block.
+    """
     R, d, shape = many.bodies.rotation, many.bodies.body[b].dims, many.bodies.body[b].shape
     if shape == SPHERE:
         return d[0]
     if is_capsule(b, many):
         return half_length(b, many) * abs(R[b, 3 * axis + 1]) + d[0]
-    if shape == HULL:
+    if shape == HULL or is_compound(b, many):
         shape = BLOCK
     e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])
     return geo.support(shape, (d[0], d[1], d[2]), e)
@@ -105,7 +109,7 @@ def write_swept_boxes(h, many):
 @inlined
 def widest_axis(many):
     """World axis along which the bodies' geometric centres have the largest variance: 0, 1 or 2."""
-    best, axis, count = -1.0, 0, many.bodies.center.shape[0]
+    best, axis, count = -1.0, 0, many.bodies.state.shape[0]
     for k in range(3):
         total = square = 0.0
         for b in range(count):

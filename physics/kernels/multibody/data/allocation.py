@@ -42,6 +42,7 @@ from physics.kernels.multibody.data.arrays import (
     WorldSnapshots,
 )
 from physics.kernels.multibody.data.hull_tables import clipped_face_capacity, make_hulls
+from physics.kernels.multibody.data.parts import ActingBodies, Part, make_parts, write_part_records
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
@@ -68,7 +69,8 @@ def bodies_setting_fields() -> list[tuple]:
 def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
     """Largest number of contacts in a world with these numbers of bodies and walls.
 
-    `polyhedra` are the bodies as `make_hulls` takes them; empty if the world has no hulls.
+    `polyhedra` are the bodies as `make_hulls` takes them; empty if the world has no hulls. Parts of compounds count as
+    bodies.
     """
     corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
     return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
@@ -92,8 +94,8 @@ def batch_capacity(bodies: int, contacts: int) -> int:
 def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
     """Number of columns of a world's row of `memory`, the warm start (`arrays.WARM_CONTACT_ID`, ...).
 
-    `polyhedra` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps one number
-    more.
+    `bodies` and `polyhedra` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps
+    one number more.
     """
     return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
 
@@ -127,7 +129,9 @@ def make_bodies_workspace(
     groups : array (bodies + walls, 2) int64, optional
         Collision group and mask of each body, then of each wall; copied. None: all may touch.
     capsules : True or None
-        Whether some bodies are capsules.
+        Whether some bodies or parts are capsules.
+    parts : sequence of Part
+        Parts of the compounds, sorted by their bodies; `polyhedra` has a row for each of them, behind the bodies.
     materials : tuple of two
         Layout of the coefficients at walls, None: those of a body act at all of them; rules and exceptions for two
         bodies, None: the default rules.
@@ -139,18 +143,19 @@ def make_bodies_workspace(
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
     """
-    contacts = contact_capacity(bodies, len(walls), polyhedra)
+    parts, capsules = settings.pop("parts", ()), settings.pop("capsules", None)
+    contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra)
+    made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules, parts)
+    acting = ActingBodies(made.body[:bodies], made.state, made.touched, made.fixed)
     return BodiesWorkspace(
-        bodies=_make_bodies(
-            bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, settings.pop("capsules", None)
-        ),
+        bodies=made._replace(parts=make_parts(bodies, parts, contacts, acting)),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
         sweeps=_make_sweeps(bodies, contacts),
         islands=_make_islands(bodies, contacts),
         system=_make_linear_system(bodies, block_capacity(bodies)),
-        newton=_make_newton(bodies, batch_capacity(bodies, contacts)),
+        newton=_make_newton(bodies, batch_capacity(bodies + len(parts), contacts)),
         walls=walls.copy(),
         materials=materials[1],
         driven=_make_driven(bodies, contacts, motion_columns),
@@ -168,21 +173,23 @@ def _make_bodies(
     fixed: np.ndarray | None,
     groups: np.ndarray | None,
     capsules: bool | None,
+    parts: Sequence[Part],
 ) -> Bodies:
-    records = np.zeros(bodies, np.dtype(body_fields(terms, materials=materials)))
+    records = np.zeros(bodies + len(parts), np.dtype(body_fields(terms, materials=materials)))
     records["relative_slop"] = relative_slop
+    write_part_records(records, bodies, parts)
     if materials is not None:
         materials.write(records)
     return Bodies(
         body=records,
         state=np.zeros((bodies, STATE_SIZE)),
-        rotation=np.zeros((bodies, 9)),
+        rotation=np.zeros((len(records), 9)),
         inv_mass=np.zeros(bodies),
         inv_inertia=np.zeros((bodies, 6)),
         twist=np.zeros((bodies, 6)),
         free_twist=np.zeros((bodies, 6)),
         momenta=np.zeros((bodies, 12)),
-        center=np.zeros((bodies, 3)),
+        center=np.zeros((len(records), 3)),
         box=np.zeros((bodies, 6)),
         touched=np.zeros(bodies, np.int64),
         spin_bound=np.zeros(bodies),
@@ -190,6 +197,7 @@ def _make_bodies(
         fixed=None if fixed is None else fixed.copy(),
         groups=None if groups is None else groups.copy(),
         capsules=capsules,
+        parts=None,
     )
 
 

@@ -8,6 +8,7 @@ Shapes are given in these numbers:
 
 ========  ==============================================================
 bodies    bodies of the world
+parts     bodies of the world, and behind them the parts of its compounds
 walls     walls of the world
 pairs     `pair_capacity`: pairs of bodies that there is room for
 contacts  `contact_capacity`: contacts that there is room for
@@ -27,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from physics.kernels.multibody.data.hull_tables import Hulls
+from physics.kernels.multibody.data.parts import Parts
 
 # First columns of two groups of six in `many.bodies.momenta` during a resting stage: twist before the loads act;
 # velocity and angular momentum after the loads have acted.
@@ -93,16 +95,16 @@ class WorldSnapshots(NamedTuple):
 class Bodies(NamedTuple):
     """Bodies of the world: parameters, poses and motion, a row for each body."""
 
-    body: np.ndarray  # (bodies,) records: parameters and loads, see `time_stepping.workspace.body_fields`
+    body: np.ndarray  # (parts,) records: parameters and loads, see `time_stepping.workspace.body_fields`
     state: np.ndarray  # (bodies, STATE_SIZE) states, columns of `state.layout`
-    rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
+    rotation: np.ndarray  # (parts, 9) rotation matrix from body frame to world frame, row by row
     inv_mass: np.ndarray  # (bodies,) 1/mass [1/kg]
     inv_inertia: np.ndarray  # (bodies, 6) inverse inertia, world frame: 00, 01, 02, 11, 12, 22 [1/(kg m²)]
     twist: np.ndarray  # (bodies, 6) velocity and angular velocity, world frame [m/s, rad/s]
     free_twist: np.ndarray  # (bodies, 6) twist without contact impulses [m/s, rad/s]
     momenta: np.ndarray  # (bodies, 12) in a resting stage: `PRE_LOAD_VELOCITY`, `LOADED_MOMENTA`; in
     # `stepping.restitution_energy`: velocity and angular momentum before an impact, then after its full rebound
-    center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
+    center: np.ndarray  # (parts, 3) geometric centre, world frame [m]
     box: np.ndarray  # (bodies, 6) lower, then upper corner of the swept box, world frame [m]
     touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
     spin_bound: np.ndarray  # (bodies,) bound of |ω| if the body may turn far in this stage, else 0 [rad/s]
@@ -110,6 +112,7 @@ class Bodies(NamedTuple):
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
     groups: np.ndarray | None  # (bodies + walls, 2) int, group and mask of each; None in a world where all may touch
     capsules: bool | None  # None in a world without capsules
+    parts: Parts | None  # None in a world without compounds
 
 
 class BroadPhase(NamedTuple):
@@ -139,7 +142,7 @@ class ContactSet(NamedTuple):
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k; below: `fixed_bodies`
     id: np.ndarray  # (contacts,) int, contact name: the same while the same features touch
-    owner: np.ndarray  # (contacts,) int, body that the normal turns with; -1: none; -2: `contact_set.PARTED`
+    owner: np.ndarray  # (contacts,) int, part that the normal turns with; -1: none; -2: `contact_set.PARTED`
     normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the owner's frame (no owner: world)
     anchor: np.ndarray  # (contacts, 6) contact arms of both bodies, each in its body frame [m]
     frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame

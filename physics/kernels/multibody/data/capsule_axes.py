@@ -13,6 +13,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.segments import nearest_place, nearest_places, point_on_segment
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.capsules import half_axis, half_length, is_capsule
+from physics.kernels.multibody.data.parts import body_of, from_body
 from physics.kernels.state.layout import SPHERE
 
 # Place on an axis from which on it is an end, up to rounding.
@@ -81,7 +82,8 @@ def normal_between_axes(k, a, b, n, many):
 
 @inlined
 def _velocity_at(b, r, many):
-    """Velocity of the point of body b at r from its centre of mass [m/s]."""
+    """Velocity of the point of a capsule or sphere b at r from its centre [m/s]."""
+    r, b = from_body(b, r, many), body_of(b, many)
     return plus(row_vector(many.bodies.twist, b, 0), qt.cross(row_vector(many.bodies.twist, b, 3), r))
 
 
@@ -97,7 +99,7 @@ def _turn_about_axis(b, u, n, w, distance, many):
     """
     y = times(1.0 / half_length(b, many), u)
     t = qt.cross(y, n)
-    across, turn = qt.dot(w, t), qt.dot(row_vector(many.bodies.twist, b, 3), t)
+    across, turn = qt.dot(w, t), qt.dot(row_vector(many.bodies.twist, body_of(b, many), 3), t)
     return across * across / distance - 2.0 * turn * qt.dot(w, y) - turn * turn * distance
 
 
@@ -111,8 +113,8 @@ def _turn_of_crossing(a, b, u, v, n, w, distance, many):
     arrive, the axes move at α s' and β t' along n. So the acceleration is n'·w + α s' - β t'.
     """
     u, v = times(1.0 / half_length(a, many), u), times(1.0 / half_length(b, many), v)
-    alpha = qt.dot(n, qt.cross(row_vector(many.bodies.twist, a, 3), u))
-    beta = qt.dot(n, qt.cross(row_vector(many.bodies.twist, b, 3), v))
+    alpha = qt.dot(n, qt.cross(row_vector(many.bodies.twist, body_of(a, many), 3), u))
+    beta = qt.dot(n, qt.cross(row_vector(many.bodies.twist, body_of(b, many), 3), v))
     c, along_u, along_v = qt.dot(u, v), qt.dot(w, u), qt.dot(w, v)
     square = 1.0 - c * c
     turn = (c * beta - alpha) * along_u + (c * alpha - beta) * along_v
@@ -156,7 +158,7 @@ def _same_target(k, a, b, time, target, many):
 def less_turn_of_axes(k, a, b, time, target, many):
     """Target velocity of contact k, less `time` [s] times the acceleration by which the normal's turn opens the gap.
 
-    Bodies a and b, which is below 0 for a wall, are those of the contact. It is the same target unless one of them is a
+    Parts a and b, which is below 0 for a wall, are those of the contact. It is the same target unless one of them is a
     capsule and both have balls.
     """
     if b < 0 or not (is_capsule(a, many) or is_capsule(b, many)) or not _are_balls(a, b, many):

@@ -16,6 +16,15 @@ from physics.kernels.multibody.data.clipped_points import clear_follow
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
+from physics.kernels.multibody.data.parts import (
+    body_of,
+    first_part,
+    from_body,
+    from_center,
+    lower_body_first,
+    note_parts,
+    second_part,
+)
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Room for feature numbers of one pair (two bodies, or a body and a wall) in the id of a contact. Pairs with a hull may
@@ -190,22 +199,24 @@ def _combine_materials(k, a, b, many):
 
 
 @inlined
-def _write_anchor(k, b, first, point, n, many):
-    """Write arm and anchor of contact k for its end on body b, at `point` (world frame) [m].
+def _write_anchor(k, part, first, point, n, many):
+    """Write arm and anchor of contact k for its end on a part, at `point` (world frame) [m].
 
     Both lead from the body's centre of mass to the point, in the world frame and in the body frame. The anchor of a
-    capsule leads to the point of its axis above, along the contact's normal n. `first` is the column of this end.
+    capsule leads to the point of its axis above, along the contact's normal n. In the part of a compound, anchors lead
+    from its geometric centre, in its own frame. `first` is the column of this end.
     """
-    arm = subtract(point, row_vector(many.bodies.state, b, 0))
+    arm = subtract(point, row_vector(many.bodies.state, body_of(part, many), 0))
     put_vector(many.contacts.arm, k, first, arm)
-    if is_capsule(b, many):
-        arm = add_scaled(arm, many.bodies.body[b].dims[0] if first == 0 else -many.bodies.body[b].dims[0], n)
-    put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, b), arm))
+    if is_capsule(part, many):
+        arm = add_scaled(arm, many.bodies.body[part].dims[0] if first == 0 else -many.bodies.body[part].dims[0], n)
+    arm = from_center(part, arm, many)
+    put_vector(many.contacts.anchor, k, first, qt.transposed_matvec(row_matrix(many.bodies.rotation, part), arm))
 
 
 @inlined
 def _first_body_share(a, b, many):
-    """Weight of body a's contact point in the common contact point of a and b, for a normal that neither body owns.
+    """Weight of part a's contact point in the common contact point of parts a and b, for a normal that neither owns.
 
     The weight is 1 if a is rounder than b, 0 if b is rounder than a, else 1/2: the point of a round body stays under
     its centre. A sphere is rounder than a capsule, a capsule is rounder than an ellipsoid, and an ellipsoid is rounder
@@ -227,12 +238,14 @@ def _first_body_share(a, b, many):
 
 @inlined
 def _join_points(k, a, b, owner, gap, n, many):
-    """Let both arms of contact k, between bodies a and b, end in one point halfway across the gap along n.
+    """Let both arms of contact k, between parts a and b, end in one point halfway across the gap along n.
 
     Equal and opposite impulses at one point keep the total angular momentum of both bodies, even across a gap. If one
     body owns the normal, the other body's point is taken, since that point slides along the owner's face.
     """
-    way = subtract(row_vector(many.bodies.state, a, 0), row_vector(many.bodies.state, b, 0))
+    way = subtract(
+        row_vector(many.bodies.state, body_of(a, many), 0), row_vector(many.bodies.state, body_of(b, many), 0)
+    )
     one = add_scaled(row_vector(many.contacts.arm, k, 0), -0.5 * gap, n)
     other = add_scaled(row_vector(many.contacts.arm, k, 3), 0.5 * gap, n)
     if owner < 0:
@@ -246,9 +259,12 @@ def _join_points(k, a, b, owner, gap, n, many):
 
 @inlined
 def end_of_pair(k, n, many):
-    """Index of the first contact after k, among the n of the set, that belongs to another pair."""
+    """Index of the first contact after k, among the n of the set, that belongs to another pair of parts."""
     a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    one, other = first_part(k, many), second_part(b, k, many)
     while k < n and many.contacts.bodies[k, 0] == a and many.contacts.bodies[k, 1] == b:
+        if first_part(k, many) != one or second_part(b, k, many) != other:
+            break
         k += 1
     return k
 
@@ -272,12 +288,13 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     Parameters
     ----------
     a, b : int
-        Bodies, of which one may be fixed; b = -1 - k is wall k. A fixed body becomes the second one.
+        Bodies, or parts of compounds, of which one may be fixed; b = -1 - k is wall k. A fixed body becomes the second
+        one.
     feature : int
         Number of the touching features of this pair: below `FEATURES_PER_PAIR` unless one of the two is a hull.
     owner : int
-        Body that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass each other, and each
-        body keeps a point of its own.
+        Body or part that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass each other,
+        and each body keeps a point of its own.
     normal : tuple of 3 floats
         Unit vector out of b, world frame.
     points : pair of tuples of 3 floats
@@ -289,22 +306,25 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     many : BodiesWorkspace
         Workspace of the world.
     """
-    k, count = many.counts[NUM_CONTACTS], many.bodies.state.shape[0]
+    k, count = many.counts[NUM_CONTACTS], many.bodies.center.shape[0]
     if k == many.contacts.gap.shape[0]:
         many.counts[NUM_DROPPED] += 1
         return False
-    a, b, normal, points = moving_first(a, b, normal, points, many)
+    one, other, normal, points = lower_body_first(a, b, normal, points, many)
+    one, other, normal, points = moving_first(one, other, normal, points, many)
+    a, b = body_of(one, many), body_of(other, many)
     end = end_of(b, many)
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, end
-    _write_anchor(k, a, 0, points[0], normal, many)
+    note_parts(k, one, other, many)
+    _write_anchor(k, one, 0, points[0], normal, many)
     acceleration = many.bodies.body[a].acceleration
-    partner = count - 1 - b
+    partner = count - 1 - other
     if b >= 0:
-        _write_anchor(k, b, 3, points[1], normal, many)
+        _write_anchor(k, other, 3, points[1], normal, many)
         if owner != PARTED:
-            _join_points(k, a, b, owner, gap, normal, many)
+            _join_points(k, one, other, owner, gap, normal, many)
         acceleration += many.bodies.body[b].acceleration
-        partner = b
+        partner = other
     write_contact_frame(k, normal, many)
     take_driven_velocity(k, many)
     clear_follow(k, many)
@@ -322,7 +342,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     page = (
         feature // FEATURES_PER_PAIR * count * partners
     )  # features from `FEATURES_PER_PAIR` on have ids behind those of all lower features
-    many.contacts.id[k] = (page + a * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
+    many.contacts.id[k] = (page + one * partners + partner) * FEATURES_PER_PAIR + feature % FEATURES_PER_PAIR
     _combine_materials(k, a, b, many)
     many.bodies.touched[a] = 1
     if end >= 0:
@@ -335,9 +355,9 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
 
 @inlined
 def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
-    """Add the only contact of bodies a and b, with data given relative to body `first`, which is a or b.
+    """Add the only contact of bodies or parts a and b, with data given relative to `first`, which is a or b.
 
-    n is the unit normal out of the other body. `on_first` and `on_second` are the points on `first` and on the other
+    n is the unit normal out of the other one. `on_first` and `on_second` are the points on `first` and on the other
     body, world frame [m]. For `gap`, h and `many` see `add_contact`.
     """
     if first == a:
@@ -348,7 +368,7 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 @inlined
 def _carried_point(b, k, first, side, n, many):
-    """Arm of body b in contact k after its motion since the contact was found, world frame [m].
+    """Arm of a body in contact k after its motion since the contact was found, at its part b, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
     contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
@@ -357,19 +377,19 @@ def _carried_point(b, k, first, side, n, many):
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
         r = side * d[0]
-        return (r * n[0], r * n[1], r * n[2])
+        return from_body(b, (r * n[0], r * n[1], r * n[2]), many)
     if shape == ELLIPSOID:
         dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
-        return geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m))
+        return from_body(b, geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m)), many)
     arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
-    return add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm
+    return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 
 
 @inlined
 def _turn_frame(k, a, b, many):
-    """Update the frame of contact k for the present poses of its bodies a and b; return its normal, world frame.
+    """Update the frame of contact k for the present poses of its parts a and b; return its normal, world frame.
 
-    A normal with an owner turns with that body. The normal of two spheres stays along the line of their centres, and
+    A normal with an owner turns with it. The normal of two spheres stays along the line of their centres, and
     that of two balls of capsules likewise. Any other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
@@ -397,16 +417,17 @@ def update_contacts(many):
     """
     for k in range(many.counts[NUM_CONTACTS]):
         a, b = many.contacts.bodies[k, 0], body_at(many.contacts.bodies[k, 1], many)
-        n = _turn_frame(k, a, b, many)
-        arm = _carried_point(a, k, 0, -1.0, n, many)
+        one, other = first_part(k, many), second_part(b, k, many)
+        n = _turn_frame(k, one, other, many)
+        arm = _carried_point(one, k, 0, -1.0, n, many)
         put_vector(many.contacts.arm, k, 0, arm)
         point = add_scaled(arm, 1.0, row_vector(many.bodies.state, a, 0))
         if b < 0:
             many.contacts.gap[k] = qt.dot(n, point) - many.walls[-1 - many.contacts.bodies[k, 1], 9]
             continue
-        arm = _carried_point(b, k, 3, 1.0, n, many)
+        arm = _carried_point(other, k, 3, 1.0, n, many)
         put_vector(many.contacts.arm, k, 3, arm)
         gap = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
         many.contacts.gap[k] = gap
         if many.contacts.owner[k] != PARTED:
-            _join_points(k, a, b, many.contacts.owner[k], gap, n, many)
+            _join_points(k, one, other, many.contacts.owner[k], gap, n, many)

@@ -10,6 +10,7 @@ All of this is left out of kernels whose scene has no fixed body.
 from __future__ import annotations
 
 from physics.compiler.decorators import if_given
+from physics.kernels.multibody.data.parts import body_of
 from physics.kernels.state.fixed_body import is_fixed
 
 
@@ -52,8 +53,8 @@ def _same_order(a, b, normal, points, many):
 
 @if_given("many.bodies.fixed", _same_order)
 def moving_first(a, b, normal, points, many):
-    """Order the ends of a contact so that its first body moves: (first, second, normal out of the second, points)."""
-    if is_fixed(a, many.bodies):
+    """Order the parts of a contact so that its first body moves: (first, second, normal out of the second, points)."""
+    if is_fixed(body_of(a, many), many.bodies):
         return b, a, (-normal[0], -normal[1], -normal[2]), (points[1], points[0])
     return a, b, normal, points
 

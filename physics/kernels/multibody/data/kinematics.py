@@ -8,6 +8,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.data.driven_bodies import drift_driven_bodies, is_driven
+from physics.kernels.multibody.data.parts import place_parts
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, principal_attitude, read_state
 
@@ -25,6 +26,7 @@ def update_body_pose(b, offset_frame, many):
     for c in range(9):
         many.bodies.rotation[b, c] = R[c]
     put_vector(many.bodies.center, b, 0, geometric_center(x, R, body, offset_frame))
+    place_parts(b, many)
     P = R
     if offset_frame is not None:
         P = qt.to_matrix(principal_attitude(q, body, offset_frame))

@@ -13,6 +13,7 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.two_body_spring import unite_linked_bodies
 from physics.kernels.math.union_find import find_root, unite_sets
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
+from physics.kernels.multibody.data.parts import acting_bodies
 from physics.kernels.state.body import read_state, write_state
 from physics.kernels.state.fixed_body import is_fixed
 from physics.kernels.state.sleeping import (
@@ -112,7 +113,7 @@ def _union_near_pairs(many):
     for k in range(many.counts[NUM_PAIRS]):
         if not _has_fixed_body(k, many):
             unite_sets(many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1], many.islands.parent)
-    unite_linked_bodies(many.islands.parent, many.bodies)
+    unite_linked_bodies(many.islands.parent, acting_bodies(many))
 
 
 @kernel

@@ -25,6 +25,7 @@ from physics.kernels.multibody.data.clipped_points import copy_follow
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
 from physics.kernels.multibody.data.driven_bodies import copy_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import shown_end
+from physics.kernels.multibody.data.parts import copy_parts
 from physics.kernels.state.sleeping import is_asleep
 
 
@@ -175,6 +176,7 @@ def copy_contact(k, to, many):
     many.contacts.mu[to], many.contacts.restitution[to] = many.contacts.mu[k], many.contacts.restitution[k]
     copy_driven_velocity(k, to, many)
     copy_follow(k, to, many)
+    copy_parts(k, to, many)
     for c in range(2):
         many.contacts.bodies[to, c] = many.contacts.bodies[k, c]
     for c in range(3):

@@ -16,6 +16,7 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.capsules import half_axis, half_length
 from physics.kernels.multibody.data.contact_set import add_contact, add_scaled, pair_slop, subtract
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_EDGE, LAST_CORNER, LAST_EDGE
+from physics.kernels.multibody.data.parts import first_part
 from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import nearest_on_hull
 from physics.kernels.multibody.narrowphase.hull_pose import pose_hull
@@ -35,7 +36,7 @@ def _is_known(s, first, capsule, slop, many):
     """True if a contact from row `first` of the set on is that of the ball at place s of the axis."""
     l = half_length(capsule, many)
     for k in range(first, many.counts[NUM_CONTACTS]):
-        column = 0 if many.contacts.bodies[k, 0] == capsule else 3
+        column = 0 if first_part(k, many) == capsule else 3
         if abs(many.contacts.anchor[k, column + 1] - s * l) <= slop:
             return True
     return False

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.half_space.conservative_advancement import (
     CHORDS,
     FAR_TURN,
@@ -40,6 +40,7 @@ from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
 from physics.kernels.multibody.data.driven_bodies import acceleration_of, spin_of, state_after
+from physics.kernels.multibody.data.parts import body_of, posed_part
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
 from physics.kernels.state.body import read_state
 from physics.kernels.state.fixed_body import is_fixed
@@ -101,17 +102,18 @@ def clear_spin_bounds(many):
 
 
 @inlined
-def _contact_side(b, y, n, offset_frame, many):
-    """Data of body b in a state y for `_gap_bound` along the unit vector n, of which there are five.
+def _contact_side(part, y, n, offset_frame, many):
+    """Data of a part of a body in a state y for `_gap_bound` along the unit vector n, of which there are five.
 
     They are the geometric centre, the rotation matrix, the arm from the centre of mass to the geometric centre (world
     frame), the velocity along n, and n x ω. The last is 0 for a sphere about its centre of mass, whose rotation moves
     no surface.
     """
-    x, q, v, L = y
+    (x, q, v, L), b = y, body_of(part, many)
     R, c, m = to_matrix(q), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if offset_frame is not None:
         c = center_arm(R, many.bodies.body[b])
+    c, R = posed_part(part, c, R, many)
     if not (many.bodies.body[b].shape == SPHERE and is_centred(offset_frame, many.bodies.body[b])):
         m = qt.cross(n, spin_of(b, q, L, offset_frame, many))
     return add_scaled(x, 1.0, c), R, c, qt.dot(n, v), m
@@ -135,7 +137,7 @@ def _support(b, R, k, hulls, many):
 
 @kernel
 def _gap_bound(t, a, b, n, sides, rate, bend, hulls, many):
-    """Lower bound of the gap between body a and body b, or wall -1 - b, along n after t [s] of free flight [m].
+    """Lower bound of the gap between part a and part b, or wall -1 - b, along n after t [s] of free flight [m].
 
     It is the formula of the module. `sides` are the results of `_contact_side` for a and b, `rate` is the relative
     velocity along n [m/s], and `bend` the bound of the relative acceleration [m/s²].
@@ -158,15 +160,15 @@ def _norm(m):
 
 @kernel
 def _safe_time(a, b, n, one, other, bend, horizon, hulls, many):
-    """Time within which the gap of body a and body b, or wall -1 - b, along n cannot close, at most `horizon` [s].
+    """Time within which the gap of part a and part b, or wall -1 - b, along n cannot close, at most `horizon` [s].
 
     `one` and `other` are the results of `_contact_side` for a and b; `bend` is the bound of the relative acceleration
     of their points [m/s²].
     """
-    rate, turning = one[3], many.bodies.body[a].radius * _norm(one[4])
+    rate, turning = one[3], many.bodies.body[body_of(a, many)].radius * _norm(one[4])
     if b >= 0:
         rate -= other[3]
-        turning += many.bodies.body[b].radius * _norm(other[4])
+        turning += many.bodies.body[body_of(b, many)].radius * _norm(other[4])
     gap = _gap_bound(0.0, a, b, n, (one, other), rate, bend, hulls, many)
     if not gap > 0.0:
         return 0.0
@@ -213,18 +215,19 @@ def _load_acceleration(b, n, many):
 
 
 @kernel
-def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
-    """Time that body a can fly freely until it arrives at body b, or wall -1 - b; h if it does not arrive [s].
+def _time_of_impact(part, other_part, h, gyroscopic, offset_frame, hulls, many):
+    """Time that a part can fly freely until it arrives at another part, or wall -1 - k; h if it does not arrive [s].
 
-    To arrive is to come within the `arrival_gap`. Bodies in contact do not fly freely, and neither does a pair that
-    touches. For them the result is the time in which they turn by `FAR_TURN`, if it is less than h: a test at the end
-    of the stage then finds any contact.
+    Parts of bodies that are no compounds are the bodies. To arrive is to come within the `arrival_gap`. Bodies in
+    contact do not fly freely, and neither does a pair that touches. For them the result is the time in which they turn
+    by `FAR_TURN`, if it is less than h: a test at the end of the stage then finds any contact.
     """
+    a, b = body_of(part, many), body_of(other_part, many)
     touch, gone, first = _ARRIVAL_FRACTION * arrival_gap(a, b, many), 0.0, h
     one = read_state(many.bodies.state, a)
-    other, partner = one, a
+    other, partner, partner_part = one, a, part
     if b >= 0:
-        other, partner = read_state(many.bodies.state, b), b
+        other, partner, partner_part = read_state(many.bodies.state, b), b, other_part
     bend = _turning_acceleration(a, h, offset_frame, many) + (
         _turning_acceleration(b, h, offset_frame, many) if b >= 0 else 0.0
     )
@@ -235,13 +238,14 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
     elif _norm(subtract(one[0], other[0])) > 0.0:
         n = subtract(one[0], other[0])
     for _ in range(MAX_ADVANCES):
-        left = _contact_side(a, one, n, offset_frame, many)
-        right = _contact_side(partner, other, n, offset_frame, many)
+        left = _contact_side(part, one, n, offset_frame, many)
+        right = _contact_side(partner_part, other, n, offset_frame, many)
         if b >= 0:
-            n, gap = gjk_distance(a, b, (left[:2], right[:2]), None, n, touch, 0.0, hulls, many)
-            left, right = _contact_side(a, one, n, offset_frame, many), _contact_side(b, other, n, offset_frame, many)
+            n, gap = gjk_distance(part, other_part, (left[:2], right[:2]), None, n, touch, 0.0, hulls, many)
+            left = _contact_side(part, one, n, offset_frame, many)
+            right = _contact_side(partner_part, other, n, offset_frame, many)
         else:
-            gap = _gap_bound(0.0, a, b, n, (left, right), 0.0, 0.0, hulls, many)
+            gap = _gap_bound(0.0, part, other_part, n, (left, right), 0.0, 0.0, hulls, many)
         if gone == 0.0 and (is_held or not gap > touch):
             if many.bodies.spin_bound[a] > 0.0:
                 first = min(first, time_to_turn_far(n, one, offset_frame, many.bodies.body[a]))
@@ -252,7 +256,7 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
         if not gap > touch:
             return gone
         pull = _load_acceleration(a, n, many) - (_load_acceleration(b, n, many) if b >= 0 else 0.0)
-        step = _safe_time(a, b, n, left, right, bend - min(0.0, pull), first - gone, hulls, many)
+        step = _safe_time(part, other_part, n, left, right, bend - min(0.0, pull), first - gone, hulls, many)
         if not step > 0.0:
             break
         gone += step
@@ -262,6 +266,23 @@ def _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many):
         if b >= 0:
             other = state_after(b, other, gone - step, step, gyroscopic, offset_frame, many)
     return gone
+
+
+def _time_of_bodies(a, b, h, gyroscopic, offset_frame, hulls, many):
+    return _time_of_impact(a, b, h, gyroscopic, offset_frame, hulls, many)
+
+
+@if_given("many.bodies.parts", _time_of_bodies)
+def _time_of_parts(a, b, h, gyroscopic, offset_frame, hulls, many):
+    """Time until some part of body a arrives at a part of body b, or at wall -1 - b, as of `_time_of_impact` [s]."""
+    span, first = many.bodies.parts.span, h
+    for part in range(span[a, 0], span[a, 1]):
+        if b < 0:
+            first = min(first, _time_of_impact(part, b, first, gyroscopic, offset_frame, hulls, many))
+            continue
+        for other in range(span[b, 0], span[b, 1]):
+            first = min(first, _time_of_impact(part, other, first, gyroscopic, offset_frame, hulls, many))
+    return first
 
 
 @kernel
@@ -276,9 +297,9 @@ def safe_stage_length(h, gyroscopic, offset_frame, hulls, many):
         if many.bodies.spin_bound[b] > 0.0:
             for wall in range(many.walls.shape[0]):
                 if may_reach_wall(b, wall, first, many):
-                    first = min(first, _time_of_impact(b, -1 - wall, first, gyroscopic, offset_frame, hulls, many))
+                    first = min(first, _time_of_parts(b, -1 - wall, first, gyroscopic, offset_frame, hulls, many))
     for k in range(many.counts[NUM_PAIRS]):
         a, b = many.broadphase.pairs[k, 0], many.broadphase.pairs[k, 1]
         if (many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0) and may_meet(a, b, first, many):
-            first = min(first, _time_of_impact(a, b, first, gyroscopic, offset_frame, hulls, many))
+            first = min(first, _time_of_parts(a, b, first, gyroscopic, offset_frame, hulls, many))
     return first

@@ -21,6 +21,7 @@ from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.multibody.data.driven_bodies import driven_velocity, driven_work
+from physics.kernels.multibody.data.parts import is_compound, place_parts
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
@@ -169,11 +170,12 @@ def clamp_body_inside_walls(b, many):
         reach = body.radius
         if is_capsule(b, many):
             reach = capsule_support(b, row_matrix(many.bodies.rotation, b), n, many)
-        elif body.shape != HULL:
+        elif body.shape != HULL and not is_compound(b, many):
             reach = geo.support(
                 body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.bodies.rotation, b), n)
             )
         put_vector(many.bodies.center, b, 0, add_scaled(center, reach - d, n))
+        place_parts(b, many)
         put_vector(many.bodies.state, b, at.POS, add_scaled(row_vector(many.bodies.state, b, at.POS), reach - d, n))
         v = row_vector(many.bodies.state, b, at.LINVEL)
         put_vector(many.bodies.state, b, at.LINVEL, add_scaled(v, -min(qt.dot(n, v), 0.0), n))

@@ -40,6 +40,14 @@ from physics.kernels.multibody.data.driven_bodies import (
 )
 from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
 from physics.kernels.multibody.data.kinematics import move_driven_bodies, update_body_pose
+from physics.kernels.multibody.data.parts import (
+    acting_bodies,
+    body_of,
+    center_velocity,
+    first_part,
+    plus_turning,
+    second_part,
+)
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
     revert_to_dissipative,
@@ -81,21 +89,23 @@ def drift_body(b, h, gyroscopic, offset_frame, many):
 
 @inlined
 def _centripetal(b, k, first, side, h, many):
-    """Acceleration ω x ṙ of body b's point in contact k, world frame [m/s²].
+    """Acceleration ω x ṙ of part b's point in contact k, world frame [m/s²].
 
-    It is 0 for a sphere, whose contact point stays under its centre, and that of the ball's centre for a capsule, whose
-    point stays under a point of its axis. It is also 0 if the body turns by more than
-    `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end. `first` is the
-    column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
+    Of a sphere it is that of its centre, under which the contact point stays: 0 unless it is a part of a compound. Of a
+    capsule it is that of the ball's centre, since its point stays under a point of its axis. It is also 0 if the body
+    turns by more than `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end.
+    `first` is the column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
-    shape, w = many.bodies.body[b].shape, row_vector(many.bodies.twist, b, 3)
-    if shape == SPHERE or qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
+    shape, w = many.bodies.body[b].shape, row_vector(many.bodies.twist, body_of(b, many), 3)
+    if qt.dot(w, w) * h * h > MAX_TARGET_TURN * MAX_TARGET_TURN:
         return (0.0, 0.0, 0.0)
+    if shape == SPHERE:
+        return plus_turning(b, (0.0, 0.0, 0.0), many)
     if shape == ELLIPSOID:
         d, n = many.bodies.body[b].dims, row_vector(many.contacts.frame, k, 0)
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
-        return qt.cross(w, rate)
+        return plus_turning(b, qt.cross(w, rate), many)
     arm = row_vector(many.contacts.arm, k, first)
     if is_capsule(b, many):
         arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
@@ -113,37 +123,37 @@ def _coriolis(k, many):
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
         return 0.0
-    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, owner, 3), slip_velocity(k, many)))
+    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, body_of(owner, many), 3), slip_velocity(k, many)))
 
 
 @if_given("many.bodies.fixed", 0.0)
 def _turn_of_line(a, b, many):
-    """Acceleration |u|²/d of the gap of two spheres because the line of their centres turns [m/s²]; else 0.
+    """Acceleration |u|²/d of the gap of spheres a and b because the line of their centres turns [m/s²]; else 0.
 
-    u is the relative velocity of the centres across that line, d their distance. `b` is an end of a contact.
+    u is the relative velocity of the centres across that line, d their distance; `b` is below 0 for a wall.
     """
-    b = body_at(b, many)
     if b < 0 or not many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
         return 0.0
-    d = subtract(row_vector(many.bodies.state, a, at.POS), row_vector(many.bodies.state, b, at.POS))
-    u = subtract(row_vector(many.bodies.twist, a, 0), row_vector(many.bodies.twist, b, 0))
+    d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
+    u = subtract(center_velocity(a, many), center_velocity(b, many))
     square, along = qt.dot(d, d), qt.dot(u, d)
     return (qt.dot(u, u) - along * along / square) / math.sqrt(square) if square > 0.0 else 0.0
 
 
 @inlined
-def _turning(k, a, b, h, many):
+def _turning(k, b, h, many):
     """Velocity that contact k loses until the end of a stage of length h [s] by turning, in the contact frame [m/s].
 
-    Its points turn with their bodies a and b; the normal turns, too. The second end b is that of `moving_body_at`.
+    Its points turn with their bodies, and the normal turns, too. `b` is the second end as of `moving_body_at`.
     """
     half = 0.5 * h
-    c = _centripetal(a, k, 0, -1.0, h, many)
+    one, other = first_part(k, many), second_part(body_at(many.contacts.bodies[k, 1], many), k, many)
+    c = _centripetal(one, k, 0, -1.0, h, many)
     if b >= 0:
-        c = subtract(c, _centripetal(b, k, 3, 1.0, h, many))
+        c = subtract(c, _centripetal(other, k, 3, 1.0, h, many))
     t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-    t = (t[0] - half * _turn_of_line(a, b, many), t[1], t[2])
-    t = less_turn_of_axes(k, a, body_at(b, many), half, t, many)
+    t = (t[0] - half * _turn_of_line(one, other, many), t[1], t[2])
+    t = less_turn_of_axes(k, one, other, half, t, many)
     if many.settings[0].is_error_controlled == 1 or has_fixed(many):
         t = (t[0] + h * _coriolis(k, many), t[1], t[2])
     return t
@@ -162,7 +172,7 @@ def set_resting_targets(n, h, many):
         a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
         slop = pair_slop(a, b, many)
         exchange_twists(a, many)
-        t = _turning(k, a, b, h, many)
+        t = _turning(k, b, h, many)
         exchange_twists(a, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many):
@@ -189,7 +199,7 @@ def hold_all_loads(h, gyroscopic, offset_frame, many):
 
     Without force fields it does nothing. `gyroscopic` and `offset_frame` are switches of `state.groups.FlightSwitches`.
     """
-    if hold_linked_loads(h, gyroscopic, offset_frame, many.bodies):
+    if hold_linked_loads(h, gyroscopic, offset_frame, acting_bodies(many)):
         return
     for b in range(many.bodies.state.shape[0]):
         if is_fixed(b, many.bodies):
@@ -307,7 +317,7 @@ def midpoint_step(n, world, h, switches, sleep, records, many):
     Impulses are stored as the next warm start. `sleep` is None if the scene declares no sleep.
     """
     hold_all_loads(h, switches.flight.gyroscopic, switches.flight.offset_frame, many)
-    note_stage_energy(switches.flight.offset_frame, many.bodies, many.bodies.body[0])
+    note_stage_energy(switches.flight.offset_frame, acting_bodies(many), many.bodies.body[0])
     step_under_held_loads(n, world, h, switches, sleep, records, many)
     _grant_driven_work(n, many)
-    limit_world_energy_gain(h, 0, switches.flight.offset_frame, many.bodies, many.bodies.body[0])
+    limit_world_energy_gain(h, 0, switches.flight.offset_frame, acting_bodies(many), many.bodies.body[0])

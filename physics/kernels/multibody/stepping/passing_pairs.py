@@ -37,6 +37,7 @@ from physics.kernels.multibody.data.contact_set import (
 from physics.kernels.multibody.data.driven_bodies import attitude_after
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
+from physics.kernels.multibody.data.parts import body_of, first_part, posed_part, second_part
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
 from physics.kernels.state.body import read_state
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
@@ -61,9 +62,9 @@ _MAX_THINNING_SHARE = 0.5
 
 
 @inlined
-def _bodies_of(k, many):
-    """Bodies of contact k; the second may be fixed, and is below 0 for a wall."""
-    return many.contacts.bodies[k, 0], body_at(many.contacts.bodies[k, 1], many)
+def _parts_of(k, many):
+    """Parts of contact k, bodies where these are no compounds; the second is below 0 for a wall."""
+    return first_part(k, many), second_part(body_at(many.contacts.bodies[k, 1], many), k, many)
 
 
 @inlined
@@ -83,20 +84,24 @@ def _smallest_half_width(b, many):
 
 @inlined
 def _is_beside_pair(k, a, b, many):
-    """True if contact k belongs to another pair than bodies a and b, and one of its bodies is a or b.
+    """True if contact k belongs to another pair than parts a and b, and one of its bodies is that of a or b.
 
-    If b is fixed, bodies that touch b do not count: they do not move it.
+    If the body of b is fixed, bodies that touch it do not count: they do not move it.
     """
+    one, other = _parts_of(k, many)
+    if one == a and other == b:
+        return False
+    a, b = body_of(a, many), body_of(b, many)
     c, d, end = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], end_of(b, many)
-    return (c != a or d != end) and (c in (a, b) or d == a or (d == end and end >= 0))
+    return c in (a, b) or d == a or (d == end and end >= 0)
 
 
 @kernel
 def _thinning(a, b, n, h, many):
-    """Depth by which bodies a and b are taken thinner [m]: the slop, plus their landing depth within h [s].
+    """Depth by which parts a and b are taken thinner [m]: the slop, plus their bodies' landing depth within h [s].
 
-    The landing depth is the largest depth to which a or b goes into other bodies or walls, among the n contacts. Pairs
-    that are marked as passing do not count, nor do depths beyond `_MAX_DEPTH_SLOPS`.
+    The landing depth is the largest depth to which one of them goes into other bodies or walls, among the n contacts.
+    Pairs that are marked as passing do not count, nor do depths beyond `_MAX_DEPTH_SLOPS`.
     """
     slop, landing = pair_slop(a, b, many), 0.0
     for k in range(n):
@@ -111,13 +116,14 @@ def _thinning(a, b, n, h, many):
 
 @inlined
 def _moves_as_foreseen(a, b, gap, n, h, many):
-    """True if nothing else is near bodies a and b, and their loads cannot close the gap [m] within h [s].
+    """True if nothing else is near parts a and b, and their loads cannot close the gap [m] within h [s].
 
-    "Near" means a contact with another body or a wall, among the n of the set.
+    "Near" means a contact with another part or a wall, among the n of the set.
     """
     for k in range(n):
         if _is_beside_pair(k, a, b, many):
             return False
+    a, b = body_of(a, many), body_of(b, many)
     one, other = many.bodies.body[a].free_acceleration, many.bodies.body[b].free_acceleration
     g = subtract(as_vector(one), as_vector(other))
     return 0.25 * h * h * h * h * qt.dot(g, g) < gap * gap
@@ -131,14 +137,15 @@ def _is_stopping(k, h, many):
 
 
 @inlined
-def _end_pose(b, h, gyroscopic, offset_frame, many):
-    """Pose of body b after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
+def _end_pose(part, h, gyroscopic, offset_frame, many):
+    """Pose of a part after h [s] of motion at constant momenta: (geometric centre [m], rotation matrix)."""
+    b = body_of(part, many)
     x, q, v, L = read_state(many.bodies.state, b)
     R = to_matrix(attitude_after(b, q, L, h, gyroscopic, offset_frame, many))
     x = add_scaled(x, h, v)
     if offset_frame is not None:
         x = add_scaled(x, 1.0, center_arm(R, many.bodies.body[b]))
-    return x, R
+    return posed_part(part, x, R, many)
 
 
 @kernel
@@ -177,17 +184,19 @@ def _holds_point(b, p, thinner, hulls, many):
 
 @inlined
 def _have_point_in_common(k, now, later, thinner, hulls, many):
-    """True if the two bodies of contact k, shrunk by `thinner` [m], certainly overlap in the later poses.
+    """True if the two parts of contact k, shrunk by `thinner` [m], certainly overlap in the later poses.
 
     Each body carries its contact point along. The test asks whether both bodies hold the middle between these two
     points. If it fails, the bodies may still overlap. `now` and `later` are pairs of poses (geometric centre, rotation
     matrix).
     """
-    a, b = _bodies_of(k, many)
+    a, b = _parts_of(k, many)
     (c, R), (d, S) = now
     (x, P), (y, Q) = later
-    p = add_scaled(row_vector(many.contacts.arm, k, 0), 1.0, subtract(row_vector(many.bodies.state, a, 0), c))
-    q = add_scaled(row_vector(many.contacts.arm, k, 3), 1.0, subtract(row_vector(many.bodies.state, b, 0), d))
+    from_c = subtract(row_vector(many.bodies.state, body_of(a, many), 0), c)
+    from_d = subtract(row_vector(many.bodies.state, body_of(b, many), 0), d)
+    p = add_scaled(row_vector(many.contacts.arm, k, 0), 1.0, from_c)
+    q = add_scaled(row_vector(many.contacts.arm, k, 3), 1.0, from_d)
     p, q = qt.transposed_matvec(R, p), qt.transposed_matvec(S, q)
     half = subtract(add_scaled(y, 1.0, qt.matvec(Q, q)), add_scaled(x, 1.0, qt.matvec(P, p)))
     return _holds_point(a, add_scaled(p, 0.5, qt.transposed_matvec(P, half)), thinner, hulls, many) and _holds_point(
@@ -197,11 +206,11 @@ def _have_point_in_common(k, now, later, thinner, hulls, many):
 
 @kernel
 def _parting_direction(k, thinner, h, gyroscopic, offset_frame, hulls, many):
-    """Find a direction that parts the bodies of contact k throughout h [s]: (unit vector out of the second, found).
+    """Find a direction that separates the parts of contact k throughout h [s]: (unit vector out of the second, found).
 
     The bodies are shrunk by `thinner` [m] on all sides.
     """
-    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _parts_of(k, many), row_vector(many.contacts.frame, k, 0)
     now = (
         (row_vector(many.bodies.center, a, 0), row_matrix(many.bodies.rotation, a)),
         (row_vector(many.bodies.center, b, 0), row_matrix(many.bodies.rotation, b)),
@@ -224,7 +233,7 @@ def _point_along(k, b, first, n, hulls, many):
     R = row_matrix(many.bodies.rotation, b)
     if is_capsule(b, many):
         arm = qt.matvec(R, row_vector(many.contacts.anchor, k, first))
-        return add_scaled(add_scaled(row_vector(many.bodies.state, b, 0), 1.0, arm), many.bodies.body[b].dims[0], n)
+        return add_scaled(add_scaled(row_vector(many.bodies.center, b, 0), 1.0, arm), many.bodies.body[b].dims[0], n)
     return support_point(b, row_vector(many.bodies.center, b, 0), R, n, 0.0, hulls, many)
 
 
@@ -234,7 +243,7 @@ def _gap_along(k, n, hulls, many):
 
     The points are the nearest ones, in the world frame [m].
     """
-    a, b = _bodies_of(k, many)
+    a, b = _parts_of(k, many)
     p = _point_along(k, a, 0, (-n[0], -n[1], -n[2]), hulls, many)
     q = _point_along(k, b, 3, n, hulls, many)
     return qt.dot(n, subtract(p, q)), p, q
@@ -246,7 +255,7 @@ def _fastest_stopping(first, last, h, many):
 
     A contact with a wall does not count, nor a pair that `conservative_advancement` serves since a body turns far.
     """
-    a, b = _bodies_of(first, many)
+    a, b = many.contacts.bodies[first, 0], body_at(many.contacts.bodies[first, 1], many)
     found = -1
     if b < 0 or many.bodies.spin_bound[a] > 0.0 or many.bodies.spin_bound[b] > 0.0:
         return found
@@ -264,7 +273,7 @@ def _mark_of_pair(k, n, h, gyroscopic, offset_frame, hulls, many):
     parts them when they are thinned by the slop alone, and the plane is not across the normal of contact k. n is the
     number of contacts in the set, h the length of the stage [s].
     """
-    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _parts_of(k, many), row_vector(many.contacts.frame, k, 0)
     slop, thinnest = pair_slop(a, b, many), _thinning(a, b, n, h, many)
     m, is_parted = _parting_direction(k, thinnest, h, gyroscopic, offset_frame, hulls, many)
     if not is_parted:
@@ -302,7 +311,7 @@ def _redirect_pair(k, n, to, h, gyroscopic, offset_frame, hulls, many):
     bodies may be the normal of contact k already. Or the bodies touch along that direction, unless contact k is deeper
     than their thinning allows along any direction. Passing bodies that nothing else can push get no contact.
     """
-    (a, b), way = _bodies_of(k, many), row_vector(many.contacts.frame, k, 0)
+    (a, b), way = _parts_of(k, many), row_vector(many.contacts.frame, k, 0)
     mark, thinner = many.contacts.target[k, 0], _thinning(a, b, n, h, many)
     if mark == _MEETING or (mark != _PASSING and not thinner > pair_slop(a, b, many)):
         return False, to

@@ -13,6 +13,7 @@ from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.data.driven_bodies import bind_motions, write_driven_velocities
+from physics.kernels.multibody.data.parts import acting_bodies, bind_parts
 from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_asleep, update_sleep, wake_world
 from physics.kernels.multibody.data.warm_start import clear_warm_start
 from physics.kernels.multibody.stepping.adaptive_substep import step_with_error_control
@@ -78,8 +79,9 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         bind_wall_coefficients(params, i, many.bodies.body[b])
         write_state(many.bodies.state, b, read_state(state, i))
         many.bodies.touched[b] = 0
+    bind_parts(many)
     bind_motions(params, world * bodies, many)
-    lost = max(find_overloaded_body(many.bodies.body), find_nonfinite_body(many.bodies.state))
+    lost = max(find_overloaded_body(acting_bodies(many).body), find_nonfinite_body(many.bodies.state))
     if lost >= 0:
         report_fault(world, lost, report)
         clear_warm_start(world, memory)
@@ -105,7 +107,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
             write_state(state, world * bodies + b, read_state(many.bodies.state, b))
         if sleep is not None and is_world_asleep(world, sleep, many):
             break
-    report_unresolved_bodies(report, many.bodies, many.bodies.body[0])
+    report_unresolved_bodies(report, acting_bodies(many), many.bodies.body[0])
     for b in range(bodies):
         i = world * bodies + b
         _, q, _, L = read_state(state, i)

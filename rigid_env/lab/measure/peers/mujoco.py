@@ -16,7 +16,7 @@ import physics
 from physics.io.mjcf.capsule_frames import OF_GEOM
 from physics.rotations import rotation_matrices
 from rigid_env.lab.measure.machine import version
-from rigid_env.lab.measure.peers.contender import State, friction, gravity, restitution, walls
+from rigid_env.lab.measure.peers.contender import State, Unsupported, friction, gravity, restitution, walls
 
 HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: as rigid as MuJoCo allows
 KINDS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule"}
@@ -62,7 +62,9 @@ class MuJoCo:
         return BOUNCING if restitution(scene) else RESTING
 
     def open(self, scene: physics.Scene, dt: float, **options) -> _Run:
-        """Build a scene in MuJoCo, which can express all our scenes; see `contender.Engine.open`."""
+        """Build a scene in MuJoCo, which can express all our scenes but those with compounds; see `Engine.open`."""
+        if any(body.kind == "compound" for body in scene.bodies):
+            raise Unsupported("compounds are not handed to MuJoCo")
         return _Run(scene, dt, options)
 
 
