@@ -74,10 +74,18 @@ class Watched:
             return np.asarray(image.convert("RGB"))
 
     def wait_for(self, is_right: Callable[[np.ndarray], bool]) -> np.ndarray:
-        """Wait for a picture for which `is_right` is true, and return it."""
-        end = time.monotonic() + PATIENCE
+        """Wait for a picture for which `is_right` is true, and return it.
+
+        The page is loaded anew once, after a quarter of the time: in one run of many it stayed empty.
+        """
+        start, is_reloaded = time.monotonic(), False
         while not is_right(picture := self.picture()):
-            assert time.monotonic() < end, "the picture does not become right"
+            waited = time.monotonic() - start
+            assert waited < PATIENCE, "the picture does not become right"
+            if waited > PATIENCE / 4 and not is_reloaded:
+                self.page.reload()
+                self.page.wait_for_selector(CANVAS, state="attached")
+                is_reloaded = True
             self.page.wait_for_timeout(200)
         return picture
 
