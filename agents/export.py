@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import gymnasium as gym
 import numpy as np
 import torch
 import typer
@@ -13,9 +14,13 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from agents.checkpoint import load_trained
 from agents.config import RunFolder
 from agents.evaluate import RUN_HELP
+from agents.features import FINE, GoalDifference
 from rigid_env.cli.files import checked, make_parents
 from rigid_env.envs.policy_files import ARRAYS, Network
 from rigid_env.terminal import make_console, run_program
+
+FEATURES = ("FlattenExtractor", GoalDifference.__name__)
+"""What a policy may put before its network, by the name of the class."""
 
 
 def network_of(model: BaseAlgorithm) -> Network:
@@ -33,13 +38,33 @@ def network_of(model: BaseAlgorithm) -> Network:
         parts, last, output = model.policy.mlp_extractor.policy_net, model.policy.action_net, "linear"
     linear = [each for each in parts if isinstance(each, torch.nn.Linear)]
     others = {type(each).__name__.lower() for each in parts if not isinstance(each, torch.nn.Linear)}
-    if model.policy.features_extractor_class.__name__ != "FlattenExtractor" or len(others) != 1:
+    features = model.policy.features_extractor_class.__name__
+    if features not in FEATURES or len(others) != 1:
         raise ValueError(
-            f"policy has the layers {[type(each).__name__ for each in parts]} behind "
-            f"{model.policy.features_extractor_class.__name__}; allowed is a fully connected network of the observation"
+            f"policy has the layers {[type(each).__name__ for each in parts]} behind {features}; "
+            f"allowed is a fully connected network of the observation, behind {' or '.join(FEATURES)}"
         )
     layers = [(_array(each.weight).T, _array(each.bias)) for each in [*linear, last]]
-    return Network(layers, activation=others.pop(), output=output)
+    squash = None
+    if features == GoalDifference.__name__:
+        layers[0], squash = _of_goals(layers[0], model.observation_space)
+    return Network(layers, activation=others.pop(), output=output, squash=squash)
+
+
+def _of_goals(
+    layer: tuple[np.ndarray, np.ndarray], space: gym.spaces.Dict
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """First layer of the joined observation, and what it squashes, of the first layer behind `GoalDifference`.
+
+    The features are linear but for tanh: with d the desired and a the achieved goal, w_a a + w_d (d - a) is
+    (w_a - w_d) a + w_d d. The parts of the observation are joined in the order of their names: a, d, observation.
+    """
+    size, goal = (space[key].shape[0] for key in ("observation", "achieved_goal"))
+    weights, biases = layer
+    of_observation, of_achieved, of_way, of_squashed = np.split(weights, np.cumsum([size, goal, goal]))
+    unit = np.eye(goal)
+    squash = FINE * np.concatenate([-unit, unit, np.zeros((size, goal))])
+    return (np.concatenate([of_achieved - of_way, of_way, of_observation, of_squashed]), biases), squash
 
 
 def _array(parameter: torch.Tensor) -> np.ndarray:

@@ -14,7 +14,8 @@ Plain arrays are a NumPy archive (``.npz``) of a fully connected network:
 | `b0`, `b1`, ... | (outputs,) | biases: a layer gives ``x @ w + b`` |
 | `activation` | text | after each layer except the last: `tanh` (default), `relu`, `elu`, `sigmoid` or `linear` |
 | `output` | text | activation after the last layer; `linear` by default |
-| `mean`, `std` | (entries,) | optional: the input of the network is ``(observation - mean) / std`` |
+| `mean`, `std` | (entries,) | optional: the input x of the network is ``(observation - mean) / std`` |
+| `squash` | (entries, n) | optional: n more inputs ``tanh(x @ squash)`` of the first layer, after x |
 
 The parts of an observation that is a dict are joined in the order of their names. Actions are clipped to ±1.
 """
@@ -160,7 +161,9 @@ class Network:
     activation, output : str
         Activation after each layer except the last, and after the last; keys of `ACTIVATIONS`.
     mean, std : (entries,) array_like, optional
-        The layers get (observation - mean) / std.
+        The layers get x = (observation - mean) / std.
+    squash : (entries, n) array_like, optional
+        The first layer gets n inputs tanh(x @ squash) more, after x.
 
     Raises
     ------
@@ -175,11 +178,15 @@ class Network:
         output: str = "linear",
         mean: np.ndarray | None = None,
         std: np.ndarray | None = None,
+        squash: np.ndarray | None = None,
     ):
         if not layers:
             raise ValueError("layers is empty; allowed is at least one pair of weights and biases")
         self.layers = [(_numbers(w, f"w{k}", 2), _numbers(b, f"b{k}", 1)) for k, (w, b) in enumerate(layers)]
-        size = self.inputs
+        self.squash = None if squash is None else _numbers(squash, "squash", 2)
+        size = len(self.layers[0][0])
+        if self.squash is not None and len(self.squash) != self.inputs:
+            raise ValueError(f"squash has shape {self.squash.shape}; w0 of {size} inputs allows ({self.inputs}, n)")
         for k, (w, b) in enumerate(self.layers):
             if w.shape != (size, *b.shape):
                 raise ValueError(f"w{k} has shape {w.shape}, b{k} {b.shape}; allowed is w{k} of ({size}, len(b{k}))")
@@ -192,7 +199,8 @@ class Network:
     @property
     def inputs(self) -> int:
         """Number of entries of an observation."""
-        return len(self.layers[0][0])
+        more = 0 if self.squash is None else self.squash.shape[1]
+        return len(self.layers[0][0]) - more
 
     def __call__(self, observations: Observations) -> np.ndarray:
         """Actions (n, numbers) float32 for observations (n, entries), or for a dict of parts of them.
@@ -208,6 +216,8 @@ class Network:
         if x.ndim != 2 or x.shape[1] != self.inputs:
             raise ValueError(f"observations have shape {x.shape}; the policy allows (n, {self.inputs})")
         x = (x - self.mean) / self.std
+        if self.squash is not None:
+            x = np.concatenate([x, np.tanh(x @ self.squash)], axis=1)
         inner = ACTIVATIONS[self.activation]
         for w, b in self.layers[:-1]:
             x = inner(x @ w + b)
@@ -219,6 +229,8 @@ class Network:
         if Path(validation.path(path)).suffix.lower() != ARRAYS:
             raise ValueError(f"path is {str(path)!r}; allowed is the ending {ARRAYS}")
         arrays = {f"{name}{k}": _short(part) for k, pair in enumerate(self.layers) for name, part in zip("wb", pair)}
+        if self.squash is not None:
+            arrays["squash"] = _short(self.squash)
         with open(path, "wb") as file:
             np.savez(file, **arrays, activation=self.activation, output=self.output, mean=self.mean, std=self.std)
         return Path(path)
@@ -240,7 +252,7 @@ class Network:
             count = sum(re.fullmatch(r"w\d+", name) is not None for name in parts)
             layers = [(parts[f"w{k}"], parts[f"b{k}"]) for k in range(count)]
             words = {name: str(parts[name]) for name in ("activation", "output") if name in parts}
-            return cls(layers, **words, mean=parts.get("mean"), std=parts.get("std"))
+            return cls(layers, **words, mean=parts.get("mean"), std=parts.get("std"), squash=parts.get("squash"))
         except Exception as error:  # any error means that the file holds no network
             told = f"there is no {error}" if isinstance(error, KeyError) else error
             raise ValueError(f"policy is {str(path)!r}, which holds no network ({told})") from None

@@ -14,6 +14,7 @@ from stable_baselines3 import PPO, SAC
 from agents import export
 from agents.algorithms import make_vector_env
 from agents.export import network_of
+from agents.features import GoalDifference
 from rigid_env import RigidVecEnv, load_policy
 
 
@@ -33,6 +34,20 @@ def test_it_acts_as_the_model(kind, env, tmp_path):
     np.testing.assert_array_equal(load_policy(path)(observations), network(observations))
     with np.load(path) as file:
         assert file["w0"].dtype == np.float32
+
+
+@pytest.mark.parametrize("kind", [PPO, SAC])
+def test_goals_are_compared_as_in_the_model(kind):
+    goals = RigidVecEnv(make_vector_env("rigid_env/BlockReachGoal-v0", 2, autoreset_mode="SameStep"))
+    policy = {"net_arch": [16, 8], "features_extractor_class": GoalDifference}
+    model = kind("MultiInputPolicy", goals, seed=0, device="cpu", policy_kwargs=policy)
+    rng = np.random.default_rng(0)
+    seen = {
+        name: rng.normal(size=(50, *part.shape)).astype(np.float32)
+        for name, part in model.observation_space.spaces.items()
+    }
+    # single precision: sums of at most 40 products of order 1, 40 * 6e-8 each
+    np.testing.assert_allclose(network_of(model)(seen), model.predict(seen, deterministic=True)[0], atol=1e-5)
 
 
 def test_other_policies_are_refused(env):

@@ -53,6 +53,17 @@ def test_arrays_alone_are_a_policy(tmp_path):
     assert load_policy(tmp_path / "p.npz")(np.array([[0.1]]))[0, 0] == pytest.approx(2.0 * np.tanh(0.3))
 
 
+def test_squashed_inputs_follow_the_others(rng, tmp_path):
+    plain, squash = made(rng, sizes=(5, 7, 3)), rng.normal(size=(3, 2))
+    network = Network(plain.layers, mean=rng.normal(size=3), std=[1.0, 2.0, 3.0], squash=squash)
+    assert network.inputs == 3
+    seen = rng.normal(size=(20, 3))
+    x = (seen - network.mean) / network.std
+    wanted = Network(plain.layers)(np.concatenate([x, np.tanh(x @ squash)], axis=1))
+    np.testing.assert_array_equal(network(seen), wanted)
+    np.testing.assert_array_equal(load_policy(network.save(tmp_path / "policy.npz"))(seen), wanted)
+
+
 @pytest.mark.parametrize(
     ("arrays", "told"),
     [
@@ -63,6 +74,7 @@ def test_arrays_alone_are_a_policy(tmp_path):
         ({"w0": np.array([["a"]]), "b0": np.zeros(1)}, "w0 has shape .*allowed are finite numbers"),
         ({"w0": np.zeros((3, 2)), "b0": np.zeros(2), "activation": "gelu"}, "activation is 'gelu'; allowed are"),
         ({"w0": np.zeros((3, 2)), "b0": np.zeros(2), "std": np.zeros(3)}, "std"),
+        ({"w0": np.zeros((3, 2)), "b0": np.zeros(2), "squash": np.zeros((3, 1))}, r"squash has .*allows \(2, n\)"),
         ({"w0": np.array([{}]), "b0": np.zeros(2)}, "allow_pickle"),
     ],
 )
