@@ -83,7 +83,7 @@ def test_a_driven_body_off_its_line_is_found():
     before = supports.poses(world)
     world.step()
     assert not supports.has_strayed(world, before, world.dt).any()
-    world.set_state(pos=world.pos + [[0, 0, 0], [1e-10, 0, 0]])
+    world.set_state(pos=world.pos + np.array([[0, 0, 0], [1e-10, 0, 0]]))
     assert supports.has_strayed(world, before, world.dt).all()
 
 

@@ -2,8 +2,9 @@
 
 An action is a row of numbers. A task lists its actuations: `Wrench`, `Force`, `Impulse` and `Drive`. Each of them takes
 the next numbers of the row and turns them into one or two vectors. First each number is clipped to ±1. Then a vector
-that is longer than 1 is shortened to length 1, and multiplied by its limit. Limits are given in units of the weight m g of the
-body, so that the same action has the same effect for every mass and gravity. Those of `Drive` are in m/s and rad/s.
+that is longer than 1 is shortened to length 1, and multiplied by its limit. Limits are given in units of the weight m g
+of the body, so that the same action has the same effect for every mass and gravity. Those of `Drive` are in m/s and
+rad/s.
 """
 
 from __future__ import annotations
