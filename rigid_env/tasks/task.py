@@ -310,7 +310,8 @@ class Task(Starts):
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
             raise self.not_finite(bad)
-        drive_bodies(self.world, self._table.drives, self.given)
+        if self._table.drives:
+            drive_bodies(self.world, self._table.drives, self.given)
         advance = self._advance
         if self.disturbed is None:
             advance.advance()
