@@ -7,6 +7,7 @@ import pytest
 
 import physics
 from benchmarks import drawn_scenery
+from benchmarks.shrink import _fewer
 from physics.plan.plan import make_plan
 from rigid_env.hard_cases.cases import driven_supports as supports
 from rigid_env.hard_cases.cases.random_scenes import Outcome, gain_limit, look
@@ -104,3 +105,26 @@ def test_a_room_knows_who_is_outside_wherever_it_goes():
     pos[0, room + 1] = middle + R @ (10.1, 0, 0)
     world.set_state(pos=pos)
     assert look(world).escaped[0] > 0.0
+
+
+def test_one_that_leaves_a_room_counts_unless_a_report_told_of_it():
+    world = physics.World(drawn_scenery.draw_scene(np.random.default_rng(1), True))
+    before, pos = look(world), world.pos.copy()
+    pos[0, 1] += (0, 20, 0)
+    world.set_state(pos=pos)
+    for is_told in (False, True):
+        outcome = Outcome.start(1)
+        outcome.told[:] = is_told
+        outcome.note(world, before, None, world.dt)
+        assert outcome.law(0, np.inf).startswith("escaped") == (not is_told)
+        assert outcome.has_left.tolist() == [is_told]
+
+
+def test_a_smaller_recording_leaves_out_bodies_that_no_pair_needs():
+    world = physics.World(drawn_scenery.draw_scene(np.random.default_rng(0), False))
+    scene = world.scene
+    assert _fewer(scene, 8).bodies == scene.bodies[:8]  # the last one: no index changes
+    pairs = {(0, 1): 0.5}
+    effects = [physics.Contact(), physics.Friction(pairs=pairs)]
+    two = physics.Scene([physics.Sphere(1.0, 1.0), physics.Sphere(1.0, 1.0, pos=(3, 0, 0))], effects=effects)
+    assert _fewer(two, 1) is None
