@@ -8,6 +8,7 @@ import numpy as np
 
 import physics
 from physics.io.recording import Recording, Start
+from physics.plan.plan import make_plan
 from physics.world.snapshot import KEPT
 from physics.world.world import Snapshot
 from rigid_env.hard_cases.cases.random_scenes import Outcome, gain_limit, look, push
@@ -73,13 +74,14 @@ def _snapshots(recording: Recording) -> list[Snapshot]:
 
 
 def _without(recording: Recording, body: int) -> Recording | None:
-    """The recording with one body less, contacts forgotten; None where that is no scene of several bodies."""
+    """The recording with one body less, contacts forgotten; None where the rest has other columns, or is no scene."""
     bodies = recording.scene.bodies
     if len(bodies) < 3:  # one alone would have another plan
         return None
-    scene = physics.Scene(
-        [other for k, other in enumerate(bodies) if k != body], recording.scene.walls, recording.scene.effects
-    )
+    scene = _fewer(recording.scene, body)
+    columns = {make_plan(each, recording.accuracy).columns for each in (scene, recording.scene) if each is not None}
+    if scene is None or len(columns) > 1:
+        return None
     fresh = dict(zip(KEPT, physics.World(scene, accuracy=recording.accuracy).kept()))
 
     def smaller(start: Start) -> Start:
@@ -96,6 +98,14 @@ def _without(recording: Recording, body: int) -> Recording | None:
         wrenches=np.delete(recording.wrenches, body, axis=1),
         states=np.delete(recording.states, body, axis=1),
     )
+
+
+def _fewer(scene: physics.Scene, body: int) -> physics.Scene | None:
+    """The scene without a body; None where the scene is no scene without it."""
+    try:
+        return physics.Scene([other for k, other in enumerate(scene.bodies) if k != body], scene.walls, scene.effects)
+    except ValueError:  # an exception for a pair, or a spring, that needs it
+        return None
 
 
 def _taken_again(recording: Recording) -> Recording:

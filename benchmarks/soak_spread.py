@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rigid_env.launchers.job import Ended, Job, shell_line
 
-MERGED = {"worlds": sum, "steps": sum, "largest_gain": max}
+MERGED = {"worlds": sum, "steps": sum, "largest_gain": max, "told": sum, "left_after_told": sum}
 
 
 def make_jobs(

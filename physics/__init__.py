@@ -31,6 +31,7 @@ from physics.scene.force_field import Field, field_function
 from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
 from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene, SceneWarning, corner, three_walls
+from physics.scene.sensor import Sensor
 from physics.schemes.contacts import Contacts
 from physics.version import version as _version
 from physics.work_precision.result import Frontier, FrontierPoint
@@ -84,6 +85,7 @@ __all__ = [
     "Rollout",
     "Scene",
     "SceneWarning",
+    "Sensor",
     "Sleeping",
     "Snapshot",
     "Solver",

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rigid_env.tasks import (
         Choice,
         Distribution,
+        Drive,
         Entry,
         Force,
         Gust,
@@ -48,8 +49,8 @@ check_engine_is_found()
 register_envs()
 
 _OF_TASKS = (
-    "Choice", "Distribution", "Entry", "Force", "Gust", "Impulse", "LogUniform", "Normal", "Push", "Task", "Uniform",
-    "Wrench", "compiled", "observe",
+    "Choice", "Distribution", "Drive", "Entry", "Force", "Gust", "Impulse", "LogUniform", "Normal", "Push", "Task",
+    "Uniform", "Wrench", "compiled", "observe",
 )  # fmt: skip
 
 _LAZY = {
@@ -88,6 +89,7 @@ __all__ = [
     "BlockReorientVectorEnv",
     "Choice",
     "Distribution",
+    "Drive",
     "Entry",
     "Force",
     "GoalTask",

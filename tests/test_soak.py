@@ -57,7 +57,16 @@ def test_the_judge_knows_rewards_that_were_not_earned():
 
 def test_what_many_processes_found_is_added_up():
     def one(worlds, failures):
-        return {"mixed": {"worlds": worlds, "steps": 2 * worlds, "failures": failures, "largest_gain": worlds / 100}}
+        return {
+            "mixed": {
+                "worlds": worlds,
+                "steps": 2 * worlds,
+                "failures": failures,
+                "largest_gain": worlds / 100,
+                "told": 3,
+                "left_after_told": 0,
+            }
+        }
 
     found, errors = soak_spread.merge(
         [
@@ -66,7 +75,14 @@ def test_what_many_processes_found_is_added_up():
             Ended("c", None, "its process ended"),
         ]
     )
-    whole = {"worlds": 600, "steps": 1200, "failures": {"inside": 3, "energy": 1}, "largest_gain": 4.0}
+    whole = {
+        "worlds": 600,
+        "steps": 1200,
+        "failures": {"inside": 3, "energy": 1},
+        "largest_gain": 4.0,
+        "told": 6,
+        "left_after_told": 0,
+    }
     assert found == {"fast": {"mixed": whole}}
     assert errors == ["c: its process ended"]
 

@@ -20,11 +20,17 @@ from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingF
 from physics.scene.force_fields import FIELDS
 from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene
+from physics.scene.sensor import Sensor
 from physics.summary import shown
 
 BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull, Compound)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
-KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
+KINDS: dict[str, tuple[type, ...]] = {
+    "bodies": BODIES,
+    "walls": (HalfSpace,),
+    "effects": EFFECTS,
+    "sensors": (Sensor,),
+}
 """Classes that each list of a scene may hold."""
 
 
@@ -35,8 +41,8 @@ def plain_scene(scene: Scene) -> dict[str, list[dict[str, Any]]]:
 
 
 def plain_table(item) -> dict[str, Any]:
-    """Convert a body or part, wall, effect or motion to a table; parameters at their defaults are left out."""
-    found = {} if isinstance(item, (HalfSpace, Motion)) else {"kind": type(item).__name__}
+    """Convert a body, part, wall, effect, motion or sensor to a table; parameters at their defaults are left out."""
+    found = {} if isinstance(item, (HalfSpace, Motion, Sensor)) else {"kind": type(item).__name__}
     for field in fields(item):
         value = getattr(item, field.name)
         if field.name == "mass" and isinstance(item, Body) and item.fixed:
@@ -103,6 +109,8 @@ def build(places: Places, name: str, index: int, table: Mapping[str, Any], known
             raise places.error(name, index, None, f"{key} is missing; a {kind.__name__} needs it")
     if kind is Compound and isinstance(table["parts"], list):
         table["parts"] = [_part(places, name, index, k, part) for k, part in enumerate(table["parts"])]
+    if kind is Sensor and isinstance(table["shape"], Mapping):
+        table["shape"] = build(_PartPlaces(places, name, index, "shape"), name, 0, table["shape"], BODIES)
     try:
         return kind(**table)
     except (ValueError, TypeError) as error:
@@ -112,14 +120,18 @@ def build(places: Places, name: str, index: int, table: Mapping[str, Any], known
 
 
 class _PartPlaces(Places):
-    """Places of a part of a compound, for errors: those of its body, and the number of the part."""
+    """Places of a part of a compound, or of the shape of a sensor, for errors: those of the table around it.
 
-    def __init__(self, places: Places, name: str, index: int):
+    `key` is that of the part or shape in table number `index` of the list `name`.
+    """
+
+    def __init__(self, places: Places, name: str, index: int, key: str = "parts"):
         super().__init__()
-        self._places, self._of = places, (name, index)
+        self._places, self._of, self._key = places, (name, index), key
 
     def error(self, name: str | None, index: int, key: str | None, message: str) -> ValueError:
-        return self._places.error(*self._of, "parts", f"parts[{index}]: {message}")
+        place = f"parts[{index}]" if self._key == "parts" else self._key
+        return self._places.error(*self._of, self._key, f"{place}: {message}")
 
 
 def _part(places: Places, name: str, index: int, k: int, part: Any) -> Any:

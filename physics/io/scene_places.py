@@ -90,7 +90,7 @@ class SourceLines(Places):
         The message names a table by its number, as in ``bodies[2]``, or by the class of an effect. `lists` holds the
         scene's bodies, walls and effects.
         """
-        told = re.search(r"\b(bodies|walls|effects)\[(\d+)\]", message)
+        told = re.search(r"\b(bodies|walls|effects|sensors)\[(\d+)\]", message)
         if told:
             return self._error_at(told.group(1), int(told.group(2)), message)
         names = [type(effect).__name__ for effect in lists["effects"]]

@@ -92,6 +92,14 @@ def _motion_rows(scene, columns) -> tuple[Row, ...]:
     return (Row("prescribed motion", True, reason, f"{columns} numbers per body, velocities at contacts"),)
 
 
+def _sensor_rows(scene) -> tuple[Row, ...]:
+    """Row that counts the sensors of a scene; none if it has no sensor."""
+    if not scene.sensors:
+        return ()
+    reason = f"declared: {_counted(len(scene.sensors), 'region')}"
+    return (Row("sensors", True, reason, "nothing in a step; World.read_sensors asks for overlaps"),)
+
+
 def _own_coefficients(scene, name, pairs, rule, usual) -> str:
     """Text about the coefficients called `name` that bodies, walls and pairs have of their own, and about their rule.
 
@@ -226,6 +234,7 @@ def make_rows(scene, accuracy, needs, refined) -> tuple[Row, ...]:
         _contact_row(scene, contact),
         _between_row(scene, contact, needs.meeting),
         *_group_rows(scene, needs.grouped),
+        *_sensor_rows(scene),
         _friction_row(scene, needs),
         _restitution_row(scene, needs),
         _tangential_row(contact, needs.laws),

@@ -22,6 +22,7 @@ from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleep
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups
 from physics.scene.materials import check_materials
+from physics.scene.sensor import Sensor, carrier_index
 from physics.scene.springs import check_ends
 from physics.summary import SCREEN, SHOWN_IF_GIVEN, counted, fields_repr, parts_repr, shown
 
@@ -134,6 +135,8 @@ class Scene:
         At most one of each kind, but any number of `Spring` and `Push`. `Friction`, `RollingFriction`,
         `SpinFriction` and `Sleeping` need `Contact`. `Contact.tangential` needs `Friction`. `Wind` needs a field
         through which it acts, such as `Drag`.
+    sensors : sequence of Sensor
+        Regions that tell which bodies are in them, and do not push.
 
     Warns
     -----
@@ -149,6 +152,7 @@ class Scene:
     bodies: tuple[Body, ...]
     walls: tuple[HalfSpace, ...] = ()
     effects: tuple[Effect, ...] = ()
+    sensors: tuple[Sensor, ...] = field(default=(), kw_only=True)
 
     if TYPE_CHECKING:
 
@@ -157,10 +161,12 @@ class Scene:
             bodies: Iterable[Body] | Body,
             walls: Iterable[HalfSpace] | HalfSpace = (),
             effects: Iterable[Effect] | Effect = (),
+            *,
+            sensors: Iterable[Sensor] | Sensor = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS)):
+        for name, allowed in (("bodies", Body), ("walls", HalfSpace), ("effects", EFFECTS), ("sensors", Sensor)):
             object.__setattr__(self, name, _items(getattr(self, name), name, allowed))
         if not self.bodies:
             raise ValueError("Scene.bodies is empty; allowed is at least one body")
@@ -183,6 +189,8 @@ class Scene:
         self._check_axes()
         self._check_fields()
         check_materials(self)
+        for k, sensor in enumerate(self.sensors):
+            carrier_index(sensor, self.bodies, f"Scene.sensors[{k}]")
         if self.walls and contact is None:
             warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
         if contact is None and any(body.fixed for body in self.bodies):
@@ -194,28 +202,30 @@ class Scene:
     def _repr_html_(self) -> str:
         if not self._expression():
             return parts_table(self)
-        lists = {"bodies": self.bodies, "walls": self.walls, "effects": self.effects}
+        lists = {"bodies": self.bodies, "walls": self.walls, "effects": self.effects, "sensors": self.sensors}
         return table(
             "Scene", ((f"{name}[{k}]", repr(each)) for name, items in lists.items() for k, each in enumerate(items))
         )
 
     def _expression(self) -> str:
         """Python expression that makes the scene again; "" if it would not fit on a screen."""
-        if len(self.bodies) + len(self.walls) + len(self.effects) > MOST_SHOWN:
+        if len(self.bodies) + len(self.walls) + len(self.effects) + len(self.sensors) > MOST_SHOWN:
             return ""
-        text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r})"
+        sensors = f", sensors={self.sensors!r}" if self.sensors else ""
+        text = f"Scene(bodies={self.bodies!r}, walls={self.walls!r}, effects={self.effects!r}{sensors})"
         return text if len(text) <= SCREEN else ""
 
     def _parts(self) -> tuple[str, ...]:
         kinds = {name: [type(item).__name__ for item in getattr(self, name)] for name in ("bodies", "effects")}
         return (
             f"{len(self.bodies)} bodies: {counted(kinds['bodies'])}", f"{len(self.walls)} walls",
-            f"effects: {counted(kinds['effects'])}",
+            f"effects: {counted(kinds['effects'])}", *([f"{len(self.sensors)} sensors"] if self.sensors else []),
         )  # fmt: skip
 
     def _check_names(self) -> None:
         named = [(f"Scene.bodies[{b}]", body.name) for b, body in enumerate(self.bodies)]
         named += [(f"Scene.walls[{k}]", wall.name) for k, wall in enumerate(self.walls)]
+        named += [(f"Scene.sensors[{k}]", sensor.name) for k, sensor in enumerate(self.sensors)]
         first: dict[str, str] = {}
         for place, name in named:
             if name is not None and first.setdefault(name, place) != place:

@@ -150,6 +150,7 @@ class Batch(Exclusive):
     scratch: list
     motions: list
     _queries: Any  # `QueryCalls`, or None before the first query
+    _regions: Any  # list of sensors' regions, or None before the first question about them
     recorder: StepListener | None
     telling: int | None
     is_torn: bool

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.kernels.queries.nearest_queries import Pairs, Probe, measure_pairs, probe_worlds
+from physics.kernels.queries.nearest_queries import Pairs, Probe, measure_pairs, probe_worlds, sense_worlds
 from physics.kernels.queries.ray_cast import NOTHING, Hits, Rays, cast_rays
 from physics.parallel.exclusive import exclusive
 from physics.scene.bodies import Body
@@ -18,6 +18,7 @@ from physics.world.nearest import Nearest, attitudes, nearest_result, pairs_of, 
 from physics.world.query_arguments import common_count, largest_distance, result, row_steps, vectors
 from physics.world.query_calls import QueryCalls
 from physics.world.ray_hits import RayHits
+from physics.world.sensors import sensor_regions, sensor_result
 
 
 class Querying(Batch):
@@ -190,6 +191,38 @@ class Querying(Batch):
         `margin` [m] is a gap that counts as touching. `nearest_to` has all other arguments and the errors.
         """
         return np.isfinite(self.nearest_to(shape, pos, quat, margin, exclude, worlds).gap)
+
+    @exclusive
+    def read_sensors(self, worlds: ArrayLike | None = None, out: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
+        """Find the bodies that touch or overlap each sensor of the scene, in the present state.
+
+        Parameters
+        ----------
+        worlds : (n,) int array_like or (worlds,) mask, optional
+            Indices of the worlds to ask, in this order; None: all.
+        out : (n, sensors, bodies) bool array, optional
+            Result of an earlier call, which is overwritten and returned.
+
+        Returns
+        -------
+        (n, sensors, bodies) bool array
+            True for a body that touches or overlaps a sensor of `Scene.sensors`, whether it moves or is fixed. It is
+            False for the body that carries the sensor.
+
+        Raises
+        ------
+        ValueError
+            A world that does not exist, or `out` of another shape.
+        RuntimeError
+            Another thread is stepping or changing this world.
+        """
+        indices, asked = self._asked(worlds)
+        inside = sensor_result(out, (asked, len(self.scene.sensors), self.body_count))
+        if self._regions is None:
+            self._regions = sensor_regions(self.scene)
+        for region, solid in self._regions:
+            self._ask(sense_worlds, indices, region, inside, solid=solid)
+        return inside
 
     def _asked(self, worlds: ArrayLike | None) -> tuple[NDArray[np.int64] | None, int]:
         """Indices of the worlds to ask, or None for all, and their number."""

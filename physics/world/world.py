@@ -141,6 +141,7 @@ class World(Touching, Querying):
             self.plan.scheme.make_motion(self.scene, self.plan, self.accuracy) for _ in range(self.team.size)
         ]
         self._queries: QueryCalls | None = None  # made at the first query
+        self._regions: list | None = None  # of sensors, likewise
         self._wrench = self.no_wrench()
         self._calls: list[BoundCall] = []
         self._bound_for: tuple | None = None  # steps and dt for which `_calls` are bound
@@ -461,6 +462,7 @@ class World(Touching, Querying):
             "scratch",
             "motions",
             "_queries",
+            "_regions",
             "_wrench",
             "_calls",
             "_bound_for",

@@ -198,6 +198,8 @@ class Frame:
         Force at the centre of body 0, or of the first n bodies, world frame [N]; kept as (n, 3).
     applied_torque : (3,) or (n, 3) float
         Torque on the same bodies, world frame [N m]; kept as (n, 3).
+    sensors : tuple of BodyView
+        Convex regions, drawn translucent.
     path : (n, 3) float
         Earlier positions of a body, world frame [m]; they are drawn as a line, and again on the floor below.
     text : tuple of str
@@ -221,9 +223,10 @@ class Frame:
     text: tuple[str, ...] = ()
     force_scale: float = 0.1
     path: np.ndarray = field(default_factory=lambda: NO_POINTS)
+    sensors: tuple[BodyView, ...] = ()
 
     def __post_init__(self):
-        for name in ("bodies", "walls", "text"):
+        for name in ("bodies", "walls", "text", "sensors"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         _set_array(self, "contact_points", (-1, 3))
         _set_array(self, "path", (-1, 3))

@@ -23,9 +23,10 @@ from rigid_env.rendering.overlays import (
     draw_wrench,
     has_near_walls,
 )
+from rigid_env.rendering.sensors import draw_sensors
 from rigid_env.rendering.shadow_layer import LitWall, ShadowLayer, lit_walls
 
-BODY_STAGES = (draw_path, draw_bodies)
+BODY_STAGES = (draw_path, draw_bodies, draw_sensors)
 ARROW_STAGES = (draw_contacts, draw_wrench)
 """Stages of drawing that draw arrows, in order; each is a function of canvas, frame and room."""
 
@@ -177,7 +178,7 @@ class Painter:
         f r √(1 + (x/z)²) / (z - r) away from it in the picture, where f is the focal length.
         """
         whole = self._pygame.Rect((0, 0), self.size)
-        has_lines = len(frame.path) > 1 or (self._has_arrows and frame.has_arrows)
+        has_lines = len(frame.path) > 1 or bool(frame.sensors) or (self._has_arrows and frame.has_arrows)
         if self.size[0] * self.size[1] < SMALL or has_lines:
             return whole
         if not frame.bodies:

@@ -15,6 +15,7 @@ from rigid_env.extras import require
 from rigid_env.rendering import BodyView, Camera, Frame, GoalView, WallView
 from rigid_env.rendering.compounds import part_views
 from rigid_env.rendering.geometry import rotation_matrix
+from rigid_env.rendering.sensors import sensor_views
 
 WEIGHT_ARROW = 2.5  # length of the arrow of a force as large as the weight of body 0 [m]
 FULL_CHANGE = 40.0  # smallest change of a pixel that shows a body instead of the rim of a shadow [of 255]
@@ -50,7 +51,7 @@ def world_frame(
     Returns
     -------
     Frame
-        Bodies, walls (if the scene has contact), contact points and forces.
+        Bodies, walls (if the scene has contact), sensors, contact points and forces.
 
     Raises
     ------
@@ -60,8 +61,9 @@ def world_frame(
     index = validation.index(index, world.worlds, "index")
     bodies = tuple(_body_view(world, index, body) for body in range(world.body_count))
     walls = _wall_views(world.scene.walls) if world.plan.contact else ()
+    sensors = sensor_views(world, index)
     if not arrows:
-        return Frame(bodies, walls, goal, text=tuple(text))
+        return Frame(bodies, walls, goal, text=tuple(text), sensors=sensors)
     wrench = np.zeros((0, 6)) if applied is None else np.asarray(applied, dtype=float).reshape(-1, 6)
     points, forces = world.contacts(index)
     first = index * world.body_count + next(b for b, body in enumerate(world.scene.bodies) if not body.fixed)
@@ -75,6 +77,7 @@ def world_frame(
         applied_force=wrench[:, :3],
         applied_torque=wrench[:, 3:],
         text=tuple(text),
+        sensors=sensors,
         force_scale=WEIGHT_ARROW * float(world.params[first, at.INV_MASS]) / strength,
     )
 

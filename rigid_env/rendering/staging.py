@@ -113,19 +113,21 @@ class Stage:
         too far to be shown whole, the picture has no walls and travels with body 0.
         """
         matrix, scale = self._matrix, self._scale
-        bodies = [self._placed(body) for body in frame.bodies]
+        bodies, sensors = ([self._placed(each) for each in views] for views in (frame.bodies, frame.sensors))
         walls = [self._wall(wall) for wall in frame.walls] if self._path is None else self._ground
         points, forces = scale * (frame.contact_points @ matrix.T - self._shift), frame.contact_forces @ matrix.T
         if self._travels:
             origin = bodies[0].pos
-            bodies, walls, points = [replace(body, pos=body.pos - origin) for body in bodies], [], points - origin
+            bodies = [replace(body, pos=body.pos - origin) for body in bodies]
+            sensors = [replace(sensor, pos=sensor.pos - origin) for sensor in sensors]
+            walls, points = [], points - origin
         if len(points) > MOST_ARROWS:
             points, forces = points[:0], forces[:0]
         longest = np.linalg.norm(forces, axis=1).max(initial=0.0)
         arrow = min(scale * frame.force_scale, LONGEST_ARROW * self._span / longest if longest else np.inf)
         return replace(
-            frame, bodies=bodies, walls=walls, contact_points=points, contact_forces=forces, force_scale=arrow,
-            path=() if self._path is None else _thinned(self._path, share),
+            frame, bodies=bodies, walls=walls, sensors=sensors, contact_points=points, contact_forces=forces,
+            force_scale=arrow, path=() if self._path is None else _thinned(self._path, share),
         )  # fmt: skip
 
     def camera(self, shot: Shot) -> Camera | None:

@@ -6,7 +6,7 @@ in a batch of many. Subclass `Task` to write a task of your own.
 """
 
 from rigid_env.tasks import compiled, observe
-from rigid_env.tasks.actions import Force, Impulse, Wrench
+from rigid_env.tasks.actions import Drive, Force, Impulse, Wrench
 from rigid_env.tasks.block_reach import BlockReach
 from rigid_env.tasks.block_reorient import BlockReorient
 from rigid_env.tasks.distribution import Distribution
@@ -21,6 +21,7 @@ __all__ = [
     "BlockReorient",
     "Choice",
     "Distribution",
+    "Drive",
     "Entry",
     "Force",
     "Gust",

@@ -1,16 +1,17 @@
-"""Actions on bodies: convert numbers between -1 and 1 to forces, torques and impulses.
+"""Actions on bodies: convert numbers between -1 and 1 to forces, torques, impulses and prescribed velocities.
 
-An action is a row of numbers. A task lists its actuations: `Wrench`, `Force` and `Impulse`. Each of them takes the next
-numbers of the row and turns them into one or two vectors. First each number is clipped to ±1. Then a vector that is
-longer than 1 is shortened to length 1, and multiplied by its limit. Limits are given in units of the weight m g of the
-body, so that the same action has the same effect for every mass and gravity.
+An action is a row of numbers. A task lists its actuations: `Wrench`, `Force`, `Impulse` and `Drive`. Each of them takes
+the next numbers of the row and turns them into one or two vectors. First each number is clipped to ±1. Then a vector
+that is longer than 1 is shortened to length 1, and multiplied by its limit. Limits are given in units of the weight m g
+of the body, so that the same action has the same effect for every mass and gravity. Those of `Drive` are in m/s and
+rad/s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,23 +20,32 @@ from physics.annotations import Frame
 
 AXES = "xyz"
 FRAMES = ("world", "body")
-FORCE, TORQUE, IMPULSE = 0, 1, 2  # kinds of a vector
+FORCE, TORQUE, IMPULSE, VELOCITY, SPIN = range(5)  # kinds of a vector
+
+WORDS = {
+    FORCE: ("force", "along", "{:g} m g"),
+    TORQUE: ("torque", "about", "{:g} m g a"),
+    IMPULSE: ("impulse", "along", "{:g} m g s"),
+    VELOCITY: ("velocity", "along", "{:g} m/s"),
+    SPIN: ("spin", "about", "{:g} rad/s"),
+}
+"""Name of each kind of vector, the preposition before its axes, and its unit with its largest length."""
 
 
 class Vector(NamedTuple):
-    """One force, torque or impulse that an action sets.
+    """One force, torque, impulse, velocity or spin that an action sets.
 
     Attributes
     ----------
     kind : int
-        FORCE, TORQUE or IMPULSE.
+        FORCE, TORQUE, IMPULSE, VELOCITY or SPIN.
     body : int
         Index of the body that the vector acts on.
     axes : str
         Axes along which the action sets the vector, letters of "xyz"; the other components are 0.
     share : float
         Largest length: of a force over the weight m g, of a torque over m g times the body's reach, of an impulse over
-        m g times 1 s.
+        m g times 1 s, of a velocity [m/s], of a spin [rad/s].
     frame : {"world", "body"}
         Frame of the axes.
     point : (3,) tuple or None
@@ -52,19 +62,19 @@ class Vector(NamedTuple):
     @property
     def names(self) -> list[str]:
         """Names of the vector's numbers for tables, such as "force along x"."""
-        what = {FORCE: "force along", TORQUE: "torque about", IMPULSE: "impulse along"}[self.kind]
+        what, preposition, _ = WORDS[self.kind]
         axes = "" if self.frame == "world" else "body axis "
-        return [f"{what} {axes}{axis}" for axis in self.axes]
+        return [f"{what} {preposition} {axes}{axis}" for axis in self.axes]
 
     @property
     def unit(self) -> str:
         """Unit of the vector's numbers for tables, where m is the body's mass, g gravity, and a the body's reach."""
-        return f"{self.share:g} m g" + {FORCE: "", TORQUE: " a", IMPULSE: " s"}[self.kind]
+        return WORDS[self.kind][2].format(self.share)
 
     @property
     def text(self) -> str:
         """Description of the vector in words, with all digits of its numbers."""
-        what = {FORCE: "force", TORQUE: "torque", IMPULSE: "impulse"}[self.kind]
+        what = WORDS[self.kind][0]
         at = "" if self.point is None else f" at {self.point}"
         return f"{what} {self.share!r} on body {self.body} along {self.axes} of the {self.frame} frame{at}"
 
@@ -205,6 +215,58 @@ class Impulse:
         return (Vector(IMPULSE, self.body, self.axes, float(self.strength), self.frame, point),)
 
 
+@dataclass(frozen=True)
+class Drive:
+    """Velocity and spin of a fixed body with a prescribed motion, such as a paddle or a turntable.
+
+    The body has them during the whole control step, whatever it meets, and contacts feel them exactly
+    (`physics.World.set_motion`). An episode begins with the motion that the scene gives the body.
+
+    Parameters
+    ----------
+    body : int
+        Index of the body, which has ``fixed=True`` and a steady `physics.Motion`.
+    velocity : float
+        Largest speed of the body's `pos` [m/s]; 0: it stays.
+    spin : float
+        Largest angular velocity about `pos` [rad/s]; 0: it does not turn.
+    velocity_axes, spin_axes : str
+        Axes of the world along which and about which the agent can move it, letters of "xyz".
+    agent : str
+        Name of the agent that chooses these numbers.
+
+    Raises
+    ------
+    ValueError
+        A negative number, velocity and spin both 0, or unknown axes.
+    """
+
+    body: int = 0
+    velocity: float = 0.0
+    spin: float = 0.0
+    velocity_axes: str = AXES
+    spin_axes: str = AXES
+    agent: str = "agent"
+
+    def __post_init__(self) -> None:
+        check_body(self.body)
+        for name in ("velocity", "spin"):
+            validation.non_negative(getattr(self, name), (), name)
+        check_axes("velocity_axes", self.velocity_axes)
+        check_axes("spin_axes", self.spin_axes)
+        if self.velocity == 0.0 == self.spin:
+            raise ValueError("velocity and spin are 0; allowed is at least one above 0")
+
+    @property
+    def vectors(self) -> tuple[Vector, ...]:
+        """Velocity and spin as `Vector`, without the one whose limit is 0."""
+        both = (
+            Vector(VELOCITY, self.body, self.velocity_axes, float(self.velocity)),
+            Vector(SPIN, self.body, self.spin_axes, float(self.spin)),
+        )
+        return tuple(vector for vector in both if vector.share > 0.0)
+
+
 def check_movable(acting, bodies) -> None:
     """Raise a ValueError if an action or disturbance acts on a body that is not in the scene or is fixed.
 
@@ -230,83 +292,3 @@ def check_axes(field: str, axes) -> None:
     """
     if not isinstance(axes, str) or not axes or axes != "".join(axis for axis in AXES if axis in axes):
         raise ValueError(f"{field} is {axes!r}; allowed are axes of 'xyz', in this order")
-
-
-class ActionTable:
-    """Arrays that describe the vectors of a task's actions, for the kernels of `rigid_env.tasks.wrenches`.
-
-    Parameters
-    ----------
-    ways : sequence of Wrench, Force and Impulse
-        Actuations that the task declares, or a single one.
-    bodies : sequence of Body
-        Bodies of the scene.
-
-    Attributes
-    ----------
-    size : int
-        Length of an action.
-    vectors : list of Vector
-        Forces, torques and impulses that an action sets.
-    table : (vectors, 6) int64
-        A row for each vector: its kind, its body, the indices in the action of its x, y and z (-1: no number, always
-        0), and 1 if the vector is in the body frame.
-    points : (vectors, 3) float64
-        Points at which the vectors act, body frame, from the centre of mass [m].
-    has_impulses : bool
-        Whether one of the vectors is an impulse.
-    agents : dict of str to (k,) int64
-        Indices of the action's numbers that each agent chooses, by the agent's name.
-
-    Raises
-    ------
-    ValueError
-        No actuation, an object of another class, or a body that is not in the scene or is fixed.
-    """
-
-    def __init__(self, ways, bodies):
-        ways = tuple(ways) if isinstance(ways, (list, tuple)) else (ways,)
-        if not ways or not all(isinstance(way, (Wrench, Force, Impulse)) for way in ways):
-            raise ValueError(f"actions is {ways!r}; allowed are Wrench, Force and Impulse, at least one")
-        self.vectors: list[Vector] = []
-        rows: list[Any] = []
-        agents: dict[str, Any] = {}
-        self.size = 0
-        for way in ways:
-            check_movable(way, bodies)
-            first = self.size
-            for vector in way.vectors:
-                places = {axis: self.size + k for k, axis in enumerate(vector.axes)}
-                rows.append(
-                    [vector.kind, vector.body, *(places.get(axis, -1) for axis in AXES), vector.frame == "body"]
-                )
-                self.vectors.append(vector)
-                self.size += len(vector.axes)
-            agents.setdefault(way.agent, []).extend(range(first, self.size))
-        self.table = np.array(rows, dtype=np.int64)
-        self.points = np.array([vector.point or (0.0, 0.0, 0.0) for vector in self.vectors])
-        self.has_impulses = any(vector.kind == IMPULSE for vector in self.vectors)
-        self.agents = {agent: np.array(places) for agent, places in agents.items()}
-
-    def limits(self, weight: np.ndarray, reach: np.ndarray, first_dt: float) -> np.ndarray:
-        """Largest length of each vector in each world.
-
-        Parameters
-        ----------
-        weight, reach : (worlds, bodies) float64
-            Weight m g [N] and reach [m] of each body.
-        first_dt : float
-            Time during which an impulse acts as a force [s].
-
-        Returns
-        -------
-        (worlds, vectors) float64
-            [N] for forces, [N m] for torques. An impulse is given as the force that acts during `first_dt` [N].
-        """
-        columns = []
-        for vector in self.vectors:
-            limit = vector.share * weight[:, vector.body]
-            if vector.kind == TORQUE:
-                limit = limit * reach[:, vector.body]
-            columns.append(limit / first_dt if vector.kind == IMPULSE else limit)
-        return np.stack(columns, axis=1)

@@ -15,7 +15,7 @@ from typing import Any
 from physics import Body
 from physics.scene.body_names import body_label
 from physics.summary import counted
-from rigid_env.tasks.actions import IMPULSE, TORQUE
+from rigid_env.tasks.actions import FORCE, IMPULSE, TORQUE
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meaning, draw_meaning
@@ -137,11 +137,11 @@ def _actions(task: Task) -> Section:
             agent = (agents[len(rows)],) if has_agents else ()
             rows.append((str(len(rows)), name + where, "-1", "1", vector.unit, *agent))
     kinds = {vector.kind for vector in task.action_vectors}
-    notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"]
+    has_loads = bool(kinds & {FORCE, TORQUE, IMPULSE})
+    notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"] if has_loads else []
     notes += [f"a is the reach of the body ({REACH})"] if TORQUE in kinds else []
-    text = (
-        f"{'. '.join(notes)}. Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer."
-    )
+    notes += ["Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer"]
+    text = f"{'. '.join(notes)}."
     text += " An impulse acts in the first physics step." if IMPULSE in kinds else ""
     before = f"`Box(-1, 1, ({task.action_size},), float32)`, held for one control step ({1e3 * task.control_dt:g} ms)."
     columns = ("Num", "Action", "Min", "Max", "Unit", *(("Agent",) if has_agents else ()))

@@ -94,6 +94,9 @@ class Functions:
             task.observed.read(worlds, np.empty((2, task.obs.shape[1]), dtype=np.float32))
         except (IndexError, KeyError) as error:
             parts = f"{task.world.body_count} bodies and {len(task.world.walls)} walls"
+            if task.world.scene.sensors:
+                sensors = f"{len(task.world.scene.sensors)} sensors"
+                parts = f"{task.world.body_count} bodies, {len(task.world.walls)} walls and {sensors}"
             told = f"observation of {self._name} ends with {type(error).__name__}: {error}"
             raise ValueError(f"{told}; allowed are parts of its scene, {parts}") from error
 

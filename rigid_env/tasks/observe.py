@@ -98,6 +98,23 @@ def lidar(body: int, directions: ArrayLike, max_distance: float, origin: ArrayLi
     return Entry(names, "m", 0.0, 1.0, read, farthest)
 
 
+def sensor(sensor: int = 0, body: int | None = None) -> Entry:
+    """Number of a sensor of the scene: 1 if the body touches it, else 0. Without `body`: 1 if any body does.
+
+    `sensor` is its index in `Scene.sensors`.
+    """
+    index = validation.count(sensor, "sensor", 0)
+    if body is not None:
+        check_body(body)
+    name = f"sensor {index}" + ("" if body is None else f" on body {body}")
+
+    def read(worlds):
+        inside = worlds.sensors[:, index]
+        return (inside.any(axis=1) if body is None else inside[:, body]).astype(np.float64)
+
+    return Entry(name, "1", 0.0, 1.0, read)
+
+
 def contact_force(body: int = 0, bound: float = REACH) -> Entry:
     """Sum of the contact forces on a body over its weight, a vector averaged over the last physics step."""
     names = _names("contact force", body)

@@ -197,7 +197,7 @@ def _checked(out: TaskRollout, worlds: int, length: int, shape: tuple[int, int, 
 def _needs_python(task: Task) -> bool:
     """True if Python must run between two control steps of the task, so that the loop cannot be compiled."""
     world = task.world
-    if task.compiled is None or task.disturbed is not None or task.has_impulses:
+    if task.compiled is None or task.disturbed is not None or task.has_impulses or task.is_driving:
         return True
     return world.actuation is not None or world.recorder is not None
 

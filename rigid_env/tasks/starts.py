@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from physics.annotations import Effect
-    from rigid_env.tasks.actions import ActionTable
+    from rigid_env.tasks.action_table import ActionTable
     from rigid_env.tasks.disturbances import Disturbances
     from rigid_env.tasks.draws import Draws
 

@@ -20,8 +20,9 @@ class StepUndo:
     def __init__(self, task: Stepped):
         self._task, world = task, task.world
         disturbed = () if task.disturbed is None else task.disturbed.arrays.values()
+        motions = [world.params] if task.is_driving else []
         changing = [world.state, world.memory, world.report_table, world.sleep, task.action, task.previous_action,
-                    task.status, task.wrench, task.record, task.outcome, task.obs,
+                    task.status, task.wrench, task.record, task.outcome, task.obs, *motions,
                     *task.memory_arrays.values(), *task.own_arrays().values(),
                     *disturbed]  # fmt: skip
         self._kept = [(array, np.empty_like(array)) for array in changing if array.size]

@@ -18,7 +18,7 @@ from physics.parallel.bound_call import BoundCall, bound_alike, compiled
 from physics.world.report import gravest
 from physics.world.rollout_loop import RolloutLoop
 from rigid_env.tasks import layout as col
-from rigid_env.tasks.actions import ActionTable
+from rigid_env.tasks.action_table import ActionTable, drive_bodies
 from rigid_env.tasks.arguments import BatchArguments, ControlArguments, takes
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.declaration_checks import check_class, check_views, checked_limit, refuse_same_keys
@@ -80,7 +80,7 @@ class Task(Starts):
     ----------
     scene : physics.Scene
         Declared by the subclass.
-    actions : sequence of Wrench, Force and Impulse
+    actions : sequence of Wrench, Force, Impulse and Drive
         Declared: how the numbers of an action act on which bodies.
     observation : sequence of Entry, or mapping of str to such
         Declared: `rigid_env.observe` has the usual entries. A mapping has the entries that each agent sees; the agents
@@ -173,7 +173,7 @@ class Task(Starts):
         self.obs = np.zeros((worlds, self.observed.size), dtype=np.float32)
         self.status = np.zeros(worlds, dtype=np.int64)
         self.weights = np.zeros((worlds, bodies))
-        self.limits = np.zeros((worlds, len(self._table.vectors)))
+        self.limits = np.zeros((worlds, len(self._table.loads)))
 
     # --- the batch ----------------------------------------------------------------------------------------
 
@@ -218,6 +218,11 @@ class Task(Starts):
         return self._table.size
 
     @property
+    def is_driving(self) -> bool:
+        """True if actions set the motions of driven bodies."""
+        return bool(self._table.drives)
+
+    @property
     def has_impulses(self) -> bool:
         """True if an action may contain an impulse."""
         return self._advance.kick is not self._advance.wrench
@@ -234,7 +239,7 @@ class Task(Starts):
 
     @property
     def action_vectors(self) -> list:
-        """Forces, torques and impulses that an action sets, in the order of its numbers."""
+        """Forces, torques, impulses, velocities and spins that an action sets, in the order of its numbers."""
         return self._table.vectors
 
     def lines(self, world: int) -> tuple[str, ...]:
@@ -248,7 +253,7 @@ class Task(Starts):
 
     @property
     def action_text(self) -> str:
-        """Description in words of the forces, torques and impulses that an action sets."""
+        """Description in words of the vectors that an action sets."""
         return ", ".join(vector.text for vector in self._table.vectors)
 
     @property
@@ -305,6 +310,8 @@ class Task(Starts):
         bad = self._write_wrenches(*self._write_arguments)
         if bad >= 0:
             raise self.not_finite(bad)
+        if self._table.drives:
+            drive_bodies(self.world, self._table.drives, self.given)
         advance = self._advance
         if self.disturbed is None:
             advance.advance()

@@ -69,6 +69,9 @@ class Stepped(Watched, Protocol):
     obs: np.ndarray
     status: np.ndarray
 
+    @property
+    def is_driving(self) -> bool: ...
+
     def own_arrays(self) -> dict[str, np.ndarray]: ...
 
 

@@ -116,6 +116,13 @@ class Worlds:
         return self._task.world.cast_rays(origins, directions, max_distance, carrier, worlds=self._read)
 
     @property
+    def sensors(self) -> np.ndarray:
+        """Flags (n, sensors, bodies) bool, True for a body in a sensor; see `physics.World.read_sensors`."""
+        if "sensors" not in self._found:
+            self._found["sensors"] = self._task.world.read_sensors(self._read)
+        return self._found["sensors"]
+
+    @property
     def contacts(self) -> Contacts:
         """Contacts of the last physics step, at most 12 rows for each body; see `physics.Contacts`."""
         return self._contacts_of()

@@ -9,7 +9,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.state import layout as at
 from physics.world.rollout_loop import END, FIRST, STEP
 
-KIND, BODY, FIRST_NUMBER, IN_BODY_FRAME = 0, 1, 2, 5  # columns of `actions.ActionTable.table`
+KIND, BODY, FIRST_NUMBER, IN_BODY_FRAME = 0, 1, 2, 5  # columns of `action_table.ActionTable.table`
 TORQUE, IMPULSE = 1, 2  # kinds, as in `rigid_env.tasks.actions`
 
 
@@ -67,10 +67,10 @@ def write_wrenches(given, actions, table, points, limits, state, wrench, kick):
         Actions.
     actions : (worlds, numbers) float64, out
         Copy of `given`.
-    table, points : (vectors, 6) int64, (vectors, 3) float64
-        As of `actions.ActionTable`.
-    limits : (worlds, vectors) float64
-        Largest lengths of the vectors [N, N m].
+    table, points : (loads, 6) int64, (loads, 3) float64
+        As of `action_table.ActionTable`.
+    limits : (worlds, loads) float64
+        Largest lengths of the loads [N, N m].
     state : (worlds * bodies, STATE_SIZE) float64
         State of the bodies, whose attitudes turn vectors from body frames.
     wrench, kick : (worlds, bodies, 6) float64, out

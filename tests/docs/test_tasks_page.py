@@ -18,6 +18,7 @@ import pytest
 from rigid_env import TaskEnv, check_task, tasks
 from rigid_env.tasks import (
     Choice,
+    Drive,
     Force,
     Gust,
     Impulse,
@@ -105,7 +106,7 @@ def test_the_tables_have_all_there_is():
     ]  # fmt: skip
     assert set(rows("**Entries")) == {call(entry) for entry in entries}
     assert set(rows("**Distributions**")) == {call(each) for each in (Uniform, LogUniform, Normal, Choice)}
-    assert set(rows("**Ways")) == {call(way) for way in (Wrench, Force, Impulse)}
+    assert set(rows("**Ways")) == {call(way) for way in (Wrench, Force, Impulse, Drive)}
     assert set(rows("**Disturbances**")) == {call(each) for each in (Push, Gust)}
     told = {name.partition("(")[0] for start in ("**Distr", "**Ways", "**Disturb") for name in rows(start)}
     assert told == set(tasks.__all__) - {

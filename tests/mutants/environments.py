@@ -70,9 +70,9 @@ TASKS = [
     _mutant(
         "tasks-impulse",
         "An impulse acts as a force without regard to the time in which it acts.",
-        "rigid_env/tasks/actions.py",
-        "columns.append(limit / first_dt if vector.kind == IMPULSE else limit)",
-        "columns.append(limit)",
+        "rigid_env/tasks/action_table.py",
+        "columns[:, k] = limit / first_dt if vector.kind == IMPULSE else limit",
+        "columns[:, k] = limit",
         "tasks/test_actions.py::test_an_impulse_changes_the_momentum_by_itself_however_long_the_step",
     ),
 ]

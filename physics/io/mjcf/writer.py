@@ -147,6 +147,7 @@ def _inexpressible(scene: Scene) -> list:
     lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution or getattr(item, "motion", None)]
     friction = scene.effect(Friction)
     lost += [friction] if friction and friction.axis is not None else []
+    lost += scene.sensors
     return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
 
 

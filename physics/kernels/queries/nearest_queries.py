@@ -1,4 +1,4 @@
-"""Distances of pairs of bodies, and the nearest body or wall to a shape, in the worlds of a batch."""
+"""Distances of pairs of bodies, the nearest body or wall to a shape, and bodies in sensors, in worlds of a batch."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.queries.nearest_points import nearest_of_bodies, nearest_to_wall
 from physics.kernels.queries.query_scratch import bounding_radius, pose_world
 from physics.kernels.queries.ray_cast import NOTHING
+from physics.kernels.state import layout as at
 
 
 class Pairs(NamedTuple):
@@ -39,6 +40,19 @@ class Probe(NamedTuple):
     count: int  # poses of a world
     max_distance: float  # [m]
     exclude: int  # body that is left out; NOTHING: none
+
+
+class Region(NamedTuple):
+    """Convex shape of a sensor, where it is in every world."""
+
+    shape: int  # code
+    dims: tuple[float, float, float]  # half edges or semi-axes [m]
+    hull_radius: float  # of the bounding sphere, if it is a hull [m]
+    center: tuple[float, float, float]  # geometric centre from the place, own frame [m]
+    pos: tuple[float, float, float]  # place [m], in the frame of the carrier
+    quat: tuple[float, float, float, float]  # attitude, in the frame of the carrier
+    carrier: int  # body that carries the sensor; NOTHING: none
+    sensor: int  # row of the results
 
 
 class Found(NamedTuple):
@@ -116,16 +130,35 @@ def measure_pairs_of_world(k, indices, bodies, scratch, pairs, found):
 
 
 @inlined
+def _pose_shape(row, x, q, shape, scratch):
+    """Write a `Probe` or `Region` at the place x with the attitude q into row `row` of the bodies."""
+    R, body = qt.to_matrix(q), scratch.bodies.body[row]
+    body.shape = shape.shape
+    body.dims[0], body.dims[1], body.dims[2] = shape.dims
+    body.radius = bounding_radius(shape.shape, shape.dims, shape.hull_radius)
+    for c in range(9):
+        scratch.bodies.rotation[row, c] = R[c]
+    put_vector(scratch.bodies.center, row, 0, plus(x, qt.matvec(R, shape.center)))
+
+
+@inlined
 def _pose_probe(row, place, attitude, probe, scratch):
     """Write the probe in one of its poses into row `row` of the bodies."""
     q = (probe.quat[attitude, 0], probe.quat[attitude, 1], probe.quat[attitude, 2], probe.quat[attitude, 3])
-    R, body = qt.to_matrix(q), scratch.bodies.body[row]
-    body.shape = probe.shape
-    body.dims[0], body.dims[1], body.dims[2] = probe.dims
-    body.radius = bounding_radius(probe.shape, probe.dims, probe.hull_radius)
-    for c in range(9):
-        scratch.bodies.rotation[row, c] = R[c]
-    put_vector(scratch.bodies.center, row, 0, plus(row_vector(probe.pos, place, 0), qt.matvec(R, probe.center)))
+    _pose_shape(row, row_vector(probe.pos, place, 0), q, probe, scratch)
+
+
+@inlined
+def _pose_region(row, world, region, bodies, scratch):
+    """Write the shape of a sensor, where it is in a world, into row `row` of the bodies."""
+    x, q = region.pos, region.quat
+    if region.carrier != NOTHING:
+        i = world * bodies.shapes.shape[0] + region.carrier
+        frame = (bodies.state[i, at.QUAT], bodies.state[i, at.QUAT + 1], bodies.state[i, at.QUAT + 2])
+        turn = (frame[0], frame[1], frame[2], bodies.state[i, at.QUAT + 3])
+        x = plus(row_vector(bodies.state, i, at.POS), qt.matvec(qt.to_matrix(turn), x))
+        q = qt.multiply(turn, q)
+    _pose_shape(row, x, q, region, scratch)
 
 
 @inlined
@@ -168,8 +201,24 @@ def probe_world(k, indices, bodies, scratch, probe, found):
         _write(k * probe.count + r, code, nearest, found)
 
 
+@kernel
+def sense_world(k, indices, bodies, scratch, region, inside):
+    """Note in `inside` (n, sensors, bodies) the bodies that touch a sensor's shape in the k-th of the worlds `indices`.
+
+    Those that another shape of the sensor touches are left as they are.
+    """
+    pose_world(indices[k], bodies, scratch)
+    row = scratch.bodies.body.shape[0] - 1
+    _pose_region(row, indices[k], region, bodies, scratch)
+    for b in range(bodies.shapes.shape[0]):
+        is_open = b != region.carrier and not inside[k, region.sensor, b]
+        if is_open and not _is_beyond(row, b, 0.0, scratch):
+            inside[k, region.sensor, b] = _nearest(row, b, scratch)[0] <= 0.0
+
+
 _measure_each = for_each_world(measure_pairs_of_world)
 _probe_each = for_each_world(probe_world)
+_sense_each = for_each_world(sense_world)
 
 
 @kernel
@@ -182,3 +231,9 @@ def measure_pairs(queue, indices, bodies, scratch, pairs, found):
 def probe_worlds(queue, indices, bodies, scratch, probe, found):
     """Find the nearest body or wall to a probe at all places k that the calling thread can take from `queue`."""
     _probe_each(queue, (indices, bodies, scratch, probe, found))
+
+
+@kernel
+def sense_worlds(queue, indices, bodies, scratch, region, inside):
+    """Note the bodies that touch a sensor's shape at all places k that the calling thread can take from `queue`."""
+    _sense_each(queue, (indices, bodies, scratch, region, inside))

@@ -6,6 +6,7 @@ import numpy as np
 
 import physics
 from physics.kernels.state import layout as at
+from rigid_env.hard_cases.cases.driven_supports import free_masses
 
 HALF_WIDTH = 10.0  # half width of the closed box that contains each scene [m]
 CELL = 5.0  # distance between the places at which several bodies start [m]
@@ -89,15 +90,15 @@ def _places(rng: np.random.Generator, world: physics.World, size: np.ndarray) ->
     return cells[chosen]
 
 
-def draw_wrench(world: physics.World, rng: np.random.Generator) -> np.ndarray:
-    """Draw wrenches (worlds, bodies, 6): forces [N] of 0.01 to 1,000,000 times the weight, and torques [N m].
+def draw_wrench(world: physics.World, rng: np.random.Generator, strongest: float = STRONGEST_FORCE) -> np.ndarray:
+    """Draw wrenches (worlds, bodies, 6): forces [N] of 0.01 to 10**strongest times the weight, and torques [N m].
 
-    Torques go up to 1,000 times the weight times the radius. Strong forces are rarer: the exponent is -2 + 8 u⁴ with u
-    uniform, which is above 5 in 3 % of the draws.
+    Torques go up to 1,000 times the weight times the radius. Strong forces are rarer: for 1,000,000 times the weight
+    the exponent is -2 + 8 u⁴ with u uniform, which is above 5 in 3 % of the draws.
     """
     shape = (world.worlds, world.body_count, 1)
-    weight = (1.0 / world.params[:, at.INV_MASS]).reshape(shape) * np.linalg.norm(world.gravity, axis=-1)[:, None, None]
+    weight = free_masses(world).reshape(shape) * np.linalg.norm(world.gravity, axis=-1)[:, None, None]
     radius = world.params[:, at.RADIUS].reshape(shape)
-    force = weight * 10.0 ** (-2 + (STRONGEST_FORCE + 2) * rng.random(shape) ** 4) * directions(rng, shape[:2])
+    force = weight * 10.0 ** (-2 + (strongest + 2) * rng.random(shape) ** 4) * directions(rng, shape[:2])
     torque = weight * radius * log_uniform(rng, -2, STRONGEST_TORQUE, shape) * directions(rng, shape[:2])
     return np.concatenate([force, torque], axis=-1)

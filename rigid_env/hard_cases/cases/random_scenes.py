@@ -16,6 +16,7 @@ from physics.accuracy import resolve
 from physics.annotations import Preset
 from physics.kernels.state import layout as at
 from rigid_env.hard_cases.case import Case, Check, Setting, none_of
+from rigid_env.hard_cases.cases import driven_supports as supports
 from rigid_env.hard_cases.cases.random_draws import HALF_WIDTH, begin, draw_wrench, scene_of
 
 # Relative energy gain beyond which a world is stopped.
@@ -27,27 +28,33 @@ PUSHED, FREE = 5, 20
 
 @dataclass(frozen=True)
 class Look:
-    """Quantities at one moment that the checked laws are about, each an array (worlds,)."""
+    """Quantities at one moment that the checked laws are about, each an array (worlds,) but for `poses`.
+
+    Energies are those in the frame of everything that can be touched, nan where it has none (`driven_supports`).
+    """
 
     kinetic: np.ndarray  # [J]
     energy: np.ndarray  # kinetic and potential [J]
     size: np.ndarray  # scale of the energy's rounding: kinetic energy, and gravity's potential over the box [J]
     escaped: np.ndarray  # depth of the deepest centre of mass behind a wall [bounding radii], 0 where inside
     is_finite: np.ndarray
+    poses: np.ndarray  # of fixed bodies (worlds, fixed bodies, 7)
 
 
 def look(world: physics.World) -> Look:
     """Compute the quantities that the laws are about, for the present state of the worlds."""
-    about = physics.diagnose(world)
-    mass = (1.0 / world.params[:, at.INV_MASS]).reshape(world.worlds, -1)
-    depth = np.abs(world.pos).max(axis=-1) - HALF_WIDTH
-    kinetic, strength = about.kinetic_energy.sum(axis=1), np.linalg.norm(world.gravity, axis=-1)
+    about, mass = physics.diagnose(world), supports.free_masses(world)
+    depth = (np.abs(supports.places_in_room(world)).max(axis=-1) - HALF_WIDTH) * (mass > 0.0)
+    V, whole, momentum = supports.frame_velocity(world), mass.sum(axis=1), about.momentum.sum(axis=1)
+    kinetic = about.kinetic_energy.sum(axis=1) + ((0.5 * whole[:, None] * V - momentum) * V).sum(axis=1)
+    potential = about.potential_energy.sum(axis=1) + whole * (world.gravity * V).sum(axis=1) * world.time
     return Look(
         kinetic=kinetic,
-        energy=about.energy.sum(axis=1),
-        size=kinetic + HALF_WIDTH * strength * mass.sum(axis=1),
+        energy=kinetic + potential,
+        size=kinetic + HALF_WIDTH * np.linalg.norm(world.gravity, axis=-1) * whole,
         escaped=np.maximum(depth / world.params[:, at.RADIUS].reshape(mass.shape), 0.0).max(axis=1),
         is_finite=np.isfinite(world.state).reshape(world.worlds, -1).all(axis=1),
+        poses=supports.poses(world),
     )
 
 
@@ -59,7 +66,7 @@ def push(world: physics.World, wrench: np.ndarray) -> np.ndarray:
     """
     lightness = world.params[:, at.INV_MASS].reshape(world.worlds, -1)
     turning = world.params[:, at.INV_INERTIA : at.INV_INERTIA + 3].max(axis=1).reshape(lightness.shape)
-    force = wrench[..., :3] + world.gravity[:, None, :] / lightness[..., None]
+    force = wrench[..., :3] + world.gravity[:, None, :] * supports.free_masses(world)[..., None]
     square = (force**2).sum(axis=-1) * lightness + (wrench[..., 3:] ** 2).sum(axis=-1) * turning
     return np.sqrt(square.sum(axis=1))
 
@@ -67,7 +74,11 @@ def push(world: physics.World, wrench: np.ndarray) -> np.ndarray:
 def _put_away(world: physics.World, lost: np.ndarray) -> None:
     """Put the worlds with the indices `lost` at rest: bodies in the middle of the box, apart from each other."""
     shape = (len(lost), world.body_count, 3)
-    places = np.broadcast_to([body.pos for body in world.scene.bodies], shape)
+    is_fixed = np.array([body.fixed for body in world.scene.bodies])
+    places = np.where(is_fixed[:, None], world.pos[lost], [body.pos for body in world.scene.bodies])
+    if supports.ROOM in world.names:
+        room = world.names.index(supports.ROOM)
+        places = places + ~is_fixed[:, None] * (world.pos[lost, room] - world.scene.bodies[room].pos)[:, None]
     world.set_state(pos=places, linvel=np.zeros(shape), angvel=np.zeros(shape), worlds=lost)
 
 
@@ -81,23 +92,34 @@ class Outcome:
         Largest energy gain beyond the work of wrenches, as a share: of √(2 K) under a wrench, of `Look.size` without
         one.
     escaped : float64
-        Largest depth of a centre of mass behind a wall [bounding radii].
+        Largest depth of a centre of mass behind a wall, or behind a side of a room [bounding radii]. Among fixed bodies
+        it does not count once a report told that a step had more impacts or turns than could be followed.
+    told : bool
+        A report told so (`Status.UNRESOLVED`).
+    has_left : bool
+        A centre of mass behind a wall or a side of a room, after a report told so.
     is_broken : bool
         A state that is not finite, a fault, or contacts left out.
+    has_strayed : bool
+        A fixed body that moved by a bit, or a driven one that left its line.
     """
 
     gain: np.ndarray
     escaped: np.ndarray
+    told: np.ndarray
+    has_left: np.ndarray
     is_broken: np.ndarray
+    has_strayed: np.ndarray
 
     @classmethod
     def start(cls, worlds: int) -> Outcome:
         """Outcome without violations, for this number of worlds."""
-        return cls(np.zeros(worlds), np.zeros(worlds), np.zeros(worlds, dtype=np.bool_))
+        flags = (np.zeros(worlds, dtype=np.bool_) for _ in range(4))
+        return cls(np.zeros(worlds), np.zeros(worlds), *flags)
 
     def broken_laws(self, limit: float) -> np.ndarray:
         """Flags (worlds,) bool of the worlds that have violated a law; a gain counts above `limit`."""
-        return self.is_broken | (self.escaped > 0) | (self.gain > limit)
+        return self.is_broken | self.has_strayed | (self.escaped > 0) | (self.gain > limit)
 
     def law(self, index: int, limit: float) -> str:
         """Name of the law that one world has violated; empty if it has violated none."""
@@ -105,6 +127,8 @@ class Outcome:
             return "not finite, a fault, or contacts left out"
         if self.escaped[index] > 0:
             return f"escaped by {self.escaped[index]:.3g} bounding radii"
+        if self.has_strayed[index]:
+            return "strayed: a fixed or driven body is not at its place"
         return f"gained {self.gain[index]:.3g} of its energy" if self.gain[index] > limit else ""
 
     def note(self, world: physics.World, before: Look, push_now: np.ndarray | None, dt: float) -> Look:
@@ -122,12 +146,16 @@ class Outcome:
         """
         now, report = look(world), world.report
         self.is_broken |= ~now.is_finite | (report.faults > 0) | (report.left_out > 0)
-        np.maximum(self.escaped, now.escaped, out=self.escaped)
+        self.has_strayed |= supports.has_strayed(world, before.poses, dt)
+        self.told |= report.unresolved > 0
+        is_excused = self.told & bool(supports.fixed_bodies(world.scene))
+        self.has_left |= is_excused & (now.escaped > 0)
+        np.maximum(self.escaped, np.where(is_excused, 0.0, now.escaped), out=self.escaped)
         if push_now is None:
             gained = (now.energy - before.energy) / np.maximum(before.size, now.size)
         else:
             gained = np.sqrt(2 * now.kinetic) / (np.sqrt(2 * before.kinetic) + push_now * dt) - 1.0
-        np.maximum(self.gain, gained, out=self.gain)
+        np.fmax(self.gain, gained, out=self.gain)  # no law of energy where `gained` is nan
         return now
 
 
@@ -141,17 +169,23 @@ def drive(
     world: physics.World,
     rng: np.random.Generator,
     told: Callable[[int, str], None] = lambda index, law: None,
+    start: Callable[[physics.World, np.random.Generator], None] = begin,
+    load: Callable[[physics.World, np.random.Generator], np.ndarray] = draw_wrench,
 ) -> Outcome:
     """Draw all worlds of a batch and run them under one wrench, then another wrench, then none.
 
     Parameters
     ----------
     world : World
-        Worlds of a scene from `scene_of`.
+        Worlds of a scene from `scene_of`, or of one for which `start` draws.
     rng : numpy.random.Generator
     told : callable, optional
         Called with the index of each world that violates a law and the name of the law, after the first step in which
         it does.
+    start : callable, optional
+        Draws parameters and states of all worlds.
+    load : callable, optional
+        Draws wrenches (worlds, bodies, 6).
 
     Returns
     -------
@@ -161,11 +195,11 @@ def drive(
     -----
     A world that has gained more than `GROSS` is put at rest: it would keep gaining energy and take long to step.
     """
-    begin(world, rng)
+    start(world, rng)
     outcome = Outcome.start(world.worlds)
     limit, seen = gain_limit(world.accuracy), np.zeros(world.worlds, dtype=np.bool_)
     for steps, is_pushed in ((PUSHED, True), (PUSHED, True), (FREE, False)):
-        wrench = draw_wrench(world, rng) if is_pushed else None
+        wrench = load(world, rng) if is_pushed else None
         push_now = push(world, wrench) if is_pushed else None
         before = look(world)
         for _ in range(steps):
