@@ -15,6 +15,7 @@ from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
+from physics.scene.cylinder import Cylinder
 from physics.scene.compound import PARTS, Compound
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
@@ -22,7 +23,7 @@ from physics.scene.motion import Motion
 from physics.scene.scene import HalfSpace, Scene
 from physics.summary import shown
 
-BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull, Compound)
+BODIES = (Block, Sphere, Ellipsoid, Capsule, Cylinder, Hull, Compound)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 KINDS: dict[str, tuple[type, ...]] = {"bodies": BODIES, "walls": (HalfSpace,), "effects": EFFECTS}
 """Classes that each list of a scene may hold."""

@@ -73,3 +73,13 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
             "only is the scheme 'events', which knows the moment of a collision"
         )
     return ""
+
+
+def to_cylinders(scene: Scene, needs: Needs) -> str:
+    """Message against cylinders in a scene whose bodies touch each other; "" if there is no conflict."""
+    if needs.meeting and needs.cylinders:
+        return (
+            "Scene.bodies holds a cylinder, and bodies touch each other; a cylinder touches walls only: allowed with it "
+            "are Contact(between_bodies=False), or groups that keep it from all bodies, and no fixed bodies that it meets"
+        )
+    return ""

@@ -13,6 +13,7 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
+from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rim_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -367,12 +368,19 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 
 @inlined
+def rolls_on_rim(k, b, many):
+    """True if body or part b is a cylinder whose point in contact k rolls along a rim."""
+    return is_cylinder(b, many) and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
+
+
+@inlined
 def _carried_point(b, k, first, side, n, many):
     """Arm of a body in contact k after its motion since the contact was found, at its part b, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
     contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
-    body's anchor; `side` is -1 for the first body and 1 for the second.
+    body's anchor; `side` is -1 for the first body and 1 for the second. On a rim of a cylinder it may roll
+    (`cylinders`).
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
@@ -381,6 +389,10 @@ def _carried_point(b, k, first, side, n, many):
     if shape == ELLIPSOID:
         dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return from_body(b, geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m)), many)
+    if rolls_on_rim(k, b, many):
+        end = many.contacts.id[k] % FEATURES_PER_PAIR
+        arm = rim_arm(b, end, row_matrix(many.bodies.rotation, b), (side * n[0], side * n[1], side * n[2]), many)
+        return from_body(b, arm, many)
     arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 

@@ -23,16 +23,19 @@ from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import follow_edges
 from physics.kernels.multibody.data.contact_set import (
+    FEATURES_PER_PAIR,
     add_scaled,
     pair_slop,
     parted_slack,
     put_vector,
     relative_acceleration_bound,
+    rolls_on_rim,
     row_matrix,
     slip_velocity,
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.cylinders import rim_arm_rate
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
     moving_body_at,
@@ -105,6 +108,11 @@ def _centripetal(b, k, first, side, h, many):
         d, n = many.bodies.body[b].dims, row_vector(many.contacts.frame, k, 0)
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
+        return plus_turning(b, qt.cross(w, rate), many)
+    if rolls_on_rim(k, b, many):
+        end, n = many.contacts.id[k] % FEATURES_PER_PAIR, row_vector(many.contacts.frame, k, 0)
+        n = (side * n[0], side * n[1], side * n[2])
+        rate = rim_arm_rate(b, end, row_matrix(many.bodies.rotation, b), w, n, many)
         return plus_turning(b, qt.cross(w, rate), many)
     arm = row_vector(many.contacts.arm, k, first)
     if is_capsule(b, many):
