@@ -16,7 +16,8 @@ import math
 
 from physics.compiler.decorators import if_given, inlined
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.vector import minus, plus, times
+from physics.kernels.math.vector import minus, plus, row_vector, times
+from physics.kernels.multibody.data.parts import body_of
 from physics.kernels.state.layout import CYLINDER
 
 # Features of a contact of a cylinder below this number are rolling points: 0 of the lower rim, 1 of the upper one.
@@ -30,6 +31,12 @@ _LEAST_SINE_SQUARED = 1.0e-30
 def is_cylinder(b, many):
     """True if body or part b is a cylinder."""
     return many.bodies.body[b].shape == CYLINDER
+
+
+@if_given("many.bodies.cylinders", False)
+def has_cylinders(many):
+    """True in a world with cylinders."""
+    return True
 
 
 @inlined
@@ -99,3 +106,38 @@ def rim_arm_rate(b, end, R, w, k, many):
     change = minus(times(-qt.dot(k, turn), y), times(qt.dot(k, y), turn))
     change = minus(change, times(qt.dot(change, p) / square, p))
     return plus(rate, times(d[0] / math.sqrt(square), change))
+
+
+@inlined
+def _free_angular_acceleration(b, many):
+    """Angular acceleration α = -I⁻¹ (ω x I ω) of body b as it turns freely at its present twist, world frame [rad/s²].
+
+    I is the inverse of the symmetric matrix A = I⁻¹, by its cofactors.
+    """
+    w, A = row_vector(many.bodies.twist, b, 3), many.bodies.inv_inertia
+    xx, xy, xz = A[b, 0], A[b, 1], A[b, 2]
+    yy, yz, zz = A[b, 3], A[b, 4], A[b, 5]
+    rows = (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
+    one, two, three = qt.cross(rows[1], rows[2]), qt.cross(rows[2], rows[0]), qt.cross(rows[0], rows[1])
+    whole = qt.dot(rows[0], one)
+    if not whole > 0.0:
+        return (0.0, 0.0, 0.0)
+    L = times(1.0 / whole, (qt.dot(one, w), qt.dot(two, w), qt.dot(three, w)))
+    m = qt.cross(L, w)
+    return (qt.dot(rows[0], m), qt.dot(rows[1], m), qt.dot(rows[2], m))
+
+
+def _same_acceleration(k, b, first, acceleration, many):
+    return acceleration
+
+
+@if_given("many.bodies.cylinders", _same_acceleration)
+def plus_free_turn(k, b, first, acceleration, many):
+    """Acceleration of the point of part b in contact k, plus α x r of free turning if b is a cylinder [m/s²].
+
+    `first` is the column of the body's arm r.
+    """
+    if not is_cylinder(b, many):
+        return acceleration
+    alpha = _free_angular_acceleration(body_of(b, many), many)
+    return plus(acceleration, qt.cross(alpha, row_vector(many.contacts.arm, k, first)))

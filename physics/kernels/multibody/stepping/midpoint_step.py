@@ -35,7 +35,7 @@ from physics.kernels.multibody.data.contact_set import (
     subtract,
     update_contacts,
 )
-from physics.kernels.multibody.data.cylinders import rim_arm_rate
+from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rim_arm_rate
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
     moving_body_at,
@@ -95,7 +95,8 @@ def _centripetal(b, k, first, side, h, many):
     """Acceleration ω x ṙ of part b's point in contact k, world frame [m/s²].
 
     Of a sphere it is that of its centre, under which the contact point stays: 0 unless it is a part of a compound. Of a
-    capsule it is that of the ball's centre, since its point stays under a point of its axis. It is also 0 if the body
+    capsule it is that of the ball's centre, since its point stays under a point of its axis. That of a cylinder includes
+    α x r for the angular acceleration α of free turning, which points of thin disks feel. It is also 0 if the body
     turns by more than `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end.
     `first` is the column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
@@ -113,11 +114,11 @@ def _centripetal(b, k, first, side, h, many):
         end, n = many.contacts.id[k] % FEATURES_PER_PAIR, row_vector(many.contacts.frame, k, 0)
         n = (side * n[0], side * n[1], side * n[2])
         rate = rim_arm_rate(b, end, row_matrix(many.bodies.rotation, b), w, n, many)
-        return plus_turning(b, qt.cross(w, rate), many)
+        return plus_free_turn(k, b, first, plus_turning(b, qt.cross(w, rate), many), many)
     arm = row_vector(many.contacts.arm, k, first)
     if is_capsule(b, many):
         arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
-    return qt.cross(w, qt.cross(w, arm))
+    return plus_free_turn(k, b, first, qt.cross(w, qt.cross(w, arm)), many)
 
 
 @inlined
@@ -183,7 +184,7 @@ def set_resting_targets(n, h, many):
         t = _turning(k, b, h, many)
         exchange_twists(a, many)
         gap = many.contacts.gap[k]
-        if many.settings[0].is_error_controlled == 1 or has_fixed(many):
+        if many.settings[0].is_error_controlled == 1 or has_fixed(many) or has_cylinders(many):
             gap += 0.5 * half * t[0]
         u = qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many))
         t = mean_slip_target(k, clamp_target_to_energy(t, u), u, many)
