@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.materials import friction_at, restitution_at
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
@@ -371,6 +371,13 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 def rolls_on_rim(k, b, many):
     """True if body or part b is a cylinder whose point in contact k rolls along a rim."""
     return is_cylinder(b, many) and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
+
+
+@if_given("many.bodies.cylinders", False)
+def may_roll(k, many):
+    """True if a point of contact k rolls along a rim of a cylinder."""
+    end = body_at(many.contacts.bodies[k, 1], many)
+    return rolls_on_rim(k, first_part(k, many), many) or (end >= 0 and rolls_on_rim(k, second_part(end, k, many), many))
 
 
 @inlined
