@@ -91,7 +91,8 @@ def _add_ring(b, end, wall, lowest, height, margin, h, many):
     middle = times((2.0 * end - 1.0) * many.bodies.body[b].dims[1], y)
     along = minus(lowest, middle)
     if height <= 2.0 * _FLAT_SINE * r:
-        _add_point(b, LOWEST_FEATURE + end, wall, plus(x, lowest), margin, h, many)
+        if qt.dot(along, along) > 0.0:  # else no point of the rim is the lowest one
+            _add_point(b, LOWEST_FEATURE + end, wall, plus(x, lowest), margin, h, many)
         along = across_axis(y, _tipping_direction(body_of(b, many), from_body(b, middle, many), wall, n, many))
     square = qt.dot(along, along)
     if not square > 0.0:
