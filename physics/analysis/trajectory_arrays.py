@@ -13,8 +13,8 @@ from physics.analysis.events import Event
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.body_names import body_names
 from physics.scene.capsule import Capsule
-from physics.scene.cylinder import Cylinder
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import Contact
 from physics.scene.scene import HalfSpace, Scene
 

@@ -15,8 +15,8 @@ from physics.io.scene_places import Places
 from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
-from physics.scene.cylinder import Cylinder
 from physics.scene.compound import PARTS, Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
 from physics.scene.motion import Motion

@@ -52,7 +52,9 @@ def _contact_row(scene, contact) -> Row:
 def _between_row(scene, contact, many) -> Row:
     if many:
         kinds = {body.kind for body in with_parts(scene.bodies)}
-        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "cylinder", "hull", "compound") if kind in kinds)
+        also = "".join(
+            f", {kind}s" for kind in ("ellipsoid", "capsule", "cylinder", "hull", "compound") if kind in kinds
+        )
         return Row(
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )

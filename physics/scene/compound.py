@@ -96,8 +96,8 @@ class Compound(Body):
     ----------
     parts : sequence of Body
         At least one `Block`, `Sphere`, `Ellipsoid`, `Capsule`, `Cylinder` or `Hull`. Velocities, name, coefficients,
-        groups and motion are those of the compound, and parts have none. Parts of a fixed compound may all be fixed, too; then
-        the centre of mass is that of equal densities.
+        groups and motion are those of the compound, and parts have none. Parts of a fixed compound may all be fixed,
+        too; then the centre of mass is that of equal densities.
     mass : float
         Mass of the whole [kg]; the masses of all parts are then scaled to it. None: their sum.
 

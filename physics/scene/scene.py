@@ -17,8 +17,8 @@ from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
 from physics.scene.capsule import Capsule
-from physics.scene.cylinder import Cylinder
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups

@@ -10,7 +10,9 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_STIFFNESS,
     LAW_TANGENTIAL,
 )
+from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
+from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
 
 DECLARED = {
@@ -76,10 +78,17 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against cylinders in a scene whose bodies touch each other; "" if there is no conflict."""
-    if needs.meeting and needs.cylinders:
-        return (
-            "Scene.bodies holds a cylinder, and bodies touch each other; a cylinder touches walls only: allowed with it "
-            "are Contact(between_bodies=False), or groups that keep it from all bodies, and no fixed bodies that it meets"
-        )
+    """Message against a cylinder that may touch another body; "" if none can."""
+    if not (needs.meeting and needs.cylinders):
+        return ""
+    between = needs.contact.between_bodies
+    pairs = touching_pairs(scene, between)
+    pairs = potential_pairs(scene, between) if pairs is None else pairs
+    for b, body in enumerate(scene.bodies):
+        if any(part.kind == "cylinder" for part in with_parts([body])) and pairs[b, : len(scene.bodies)].any():
+            other = int(pairs[b, : len(scene.bodies)].argmax())
+            return (
+                f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; a cylinder touches walls "
+                "only: allowed are Contact(between_bodies=False) with bodies that move, and groups that keep both apart"
+            )
     return ""

@@ -14,7 +14,7 @@ from physics.parallel.exclusive import exclusive
 from physics.scene.bodies import Body
 from physics.world import choice
 from physics.world.batch import Batch
-from physics.world.nearest import Nearest, check_pairs, check_shape, attitudes, nearest_result, pairs_of, shape_numbers
+from physics.world.nearest import Nearest, attitudes, check_pairs, check_shape, nearest_result, pairs_of, shape_numbers
 from physics.world.query_arguments import common_count, largest_distance, result, row_steps, vectors
 from physics.world.query_calls import QueryCalls
 from physics.world.ray_hits import RayHits

@@ -91,9 +91,7 @@ class QueryCalls:
             kinds = self._kinds._replace(capsules=True) if solid is CAPSULE else self._kinds
             solids = [*self._solids, None if solid is CAPSULE else solid]
             bodies = len(self._solids) - len(self._parts)
-            made = [
-                make_query_scratch(bodies, self._walls, solids, kinds, self._parts) for _ in range(self._team.size)
-            ]
+            made = [make_query_scratch(bodies, self._walls, solids, kinds, self._parts) for _ in range(self._team.size)]
             self._scratch[id(solid)] = solid, made
         return self._scratch[id(solid)][1]
 

@@ -63,6 +63,22 @@ DATA = [
         "physics/test_capsules.py::test_a_capsule_rolls_down_a_slope",
     ),
     _mutant(
+        "data-rim",
+        "The lowest point of a cylinder stays where it is in the body, and does not roll along the rim.",
+        "data/cylinders.py",
+        "change = minus(times(-qt.dot(k, turn), y), times(qt.dot(k, y), turn))",
+        "change = (0.0, 0.0, 0.0)",
+        "physics/test_cylinders.py::test_a_tilted_disk_moves_as_the_equations_say",
+    ),
+    _mutant(
+        "data-free-turn",
+        "The contact point of a cylinder does not feel how its spin turns.",
+        "data/cylinders.py",
+        "return plus(acceleration, qt.cross(alpha, row_vector(many.contacts.arm, k, first)))",
+        "return acceleration",
+        "physics/test_cylinders.py::test_a_tilted_disk_moves_as_the_equations_say",
+    ),
+    _mutant(
         "data-part-place",
         "The parts of a compound stay where they are while it turns.",
         "data/parts.py",
@@ -160,6 +176,14 @@ NARROWPHASE = [
         "if far > distance or",
         "if far > 0.9 * distance or",
         "kernels/test_capsules.py::test_a_capsule_over_an_edge_touches_it_whatever_rounding_does",
+    ),
+    _mutant(
+        "narrowphase-cylinder-ring",
+        "The ring of a cylinder's face begins at a fixed point of the body, not where loads would tip it.",
+        "narrowphase/cylinder_wall.py",
+        "    if not square > 0.0:",
+        "    if height <= 2.0 * _FLAT_SINE * r:",
+        "physics/test_cylinders.py::test_a_cylinder_stands_below_the_critical_angle",
     ),
     _mutant(
         "narrowphase-capsule-inside",

@@ -87,7 +87,9 @@ def leaning(share: float, direction: float, time: float, preset="balanced", dt=0
     """
     r, half = 0.1, 0.15
     slope = math.atan(share * r / half)
-    pull = G * np.array([math.sin(slope) * math.cos(direction), -math.cos(slope), math.sin(slope) * math.sin(direction)])
+    pull = G * np.array(
+        [math.sin(slope) * math.cos(direction), -math.cos(slope), math.sin(slope) * math.sin(direction)]
+    )
     cylinder = physics.Cylinder(r, 2 * half, 1.0, pos=(0, half, 0))
     world = world_of(cylinder, laws=effects(1.5, pull), dt=dt, accuracy=preset)
     world.step(steps=round(time / dt))
@@ -170,7 +172,9 @@ def test_the_reference_keeps_energy_and_rolls_in_a_circle():
     assert found[[2, 0]] == pytest.approx(axis[2] * middle, abs=1e-10)  # z turns towards x about y
     assert end[1] == pytest.approx(start[1], abs=1e-11)
     for law in ("rolling", "free"):
-        assert energy(disk_start(law)) == pytest.approx(energy(motion(disk_start(law), 0.1, R0, HEIGHT, law=law)), rel=1e-11)
+        assert energy(disk_start(law)) == pytest.approx(
+            energy(motion(disk_start(law), 0.1, R0, HEIGHT, law=law)), rel=1e-11
+        )
     force = derivative(end, R0, HEIGHT, "rolling", 0.0, G)[1]
     assert np.hypot(force[0], force[2]) < MU["circle"] * force[1]
 
@@ -319,8 +323,18 @@ def test_a_cylinder_in_a_compound_moves_as_the_cylinder():
 @pytest.mark.parametrize("other", [physics.Block((1, 1, 1), 1.0), physics.Cylinder(0.1, 0.2, 1.0)])
 def test_bodies_that_touch_a_cylinder_are_refused_by_name(other):
     scene = scene_of(physics.Cylinder(0.1, 0.3, 1.0, pos=(0, 3, 0)), other)
-    with pytest.raises(ValueError, match=r"Scene\.bodies holds a cylinder, and bodies touch each other"):
+    with pytest.raises(ValueError, match=r"Scene\.bodies\[0\] is or holds a cylinder, which may touch bodies\[1\]"):
         physics.World(scene, dt=0.01)
+
+
+def test_groups_keep_a_cylinder_apart_from_bodies():
+    """The ball and the block touch each other, and the cylinder passes through both."""
+    can = physics.Cylinder(0.1, 0.2, 1.0, pos=(0, 0.4, 0), group=2, mask=4)
+    floor = physics.HalfSpace((0, 1, 0), group=4)
+    bodies = [can, physics.Sphere(0.1, 1.0, pos=(0, 0.7, 0)), physics.Block((1, 0.2, 1), 1.0, pos=(0, 0.1, 0))]
+    world = physics.World(physics.Scene(bodies, [floor], effects()), dt=0.01)
+    world.step(steps=100)
+    assert world.pos[0, :, 1] == pytest.approx([0.1, 0.3, 0.1], abs=1e-4)
 
 
 def test_queries_refuse_a_cylinder_beside_other_shapes_by_name():

@@ -1,7 +1,7 @@
 """A cylinder that touches the floor y = 0 with one point of its lower rim: equations of motion, solved by DOP853.
 
-The state is (x, q, v, ω): centre of mass, attitude, velocity and angular velocity, world frame. The axis a = R y has the
-lower end -l a. With the unit vector n up, the lowest point of the rim is
+The state is (x, q, v, ω): centre of mass, attitude, velocity and angular velocity, world frame. The axis a = R y has
+the lower end -l a. With the unit vector n up, the lowest point of the rim is
 
     r = -l a + R_0 d,    d = -(n - (n·a) a)/|n - (n·a) a|,    R_0: the radius.
 
@@ -65,7 +65,9 @@ def derivative(y, radius, height, law, mu, g):
         force = -(UP @ free) / (UP @ W @ way) * way
     w, x, yy, z = q
     a, b, c = omega
-    turn = 0.5 * np.array([-a * x - b * yy - c * z, a * w + b * z - c * yy, b * w + c * x - a * z, c * w + a * yy - b * x])
+    turn = 0.5 * np.array(
+        [-a * x - b * yy - c * z, a * w + b * z - c * yy, b * w + c * x - a * z, c * w + a * yy - b * x]
+    )
     return np.concatenate((v, turn, force - g * UP, inverse @ (spin + np.cross(r, force)))), force
 
 
@@ -93,7 +95,7 @@ def steady_precession(tilt, rate, radius, height, g=9.81):
     With the axis a, the tilt θ of a from y, and the spin s about the axis, ω = rate y + s a. The lowest point is at
     b = -l a + R_0 d. The centre of mass moves on a circle at v = -ω x b, with the acceleration rate y x v, so that the
     force is F = rate y x v + g y for a mass of 1 kg. The angular momentum L = I ω turns with the axis: rate y x L = b x
-    F. All these vectors are across the horizontal axis of the tilt, x, so that one equation for s is left; it is linear.
+    F. All these vectors are across the horizontal axis of the tilt, x, so that one linear equation for s is left.
     """
     q = (math.cos(0.5 * tilt), math.sin(0.5 * tilt), 0.0, 0.0)
     R = rotation(q)

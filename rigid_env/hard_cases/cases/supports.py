@@ -198,5 +198,11 @@ CASES = (
     Case(64, "capsule-upright", "a capsule stands on its end", "it does not turn", capsule_upright),
     Case(65, "belt-reverses", "a belt reverses under a block that slips", "ways under μ g", belt_reverses),
     Case(66, "press", "a plate pushes blocks of 1 kg and 1,000,000 kg", "both have its speed, no overlap", press),
-    Case(67, "coin", "a coin spins down on its face, and on its edge", "ω₀ - 2 μ g t/r; no gain of energy", coin_spins_down),
+    Case(
+        67,
+        "coin",
+        "a coin spins down on its face, and on its edge",
+        "ω₀ - 2 μ g t/r; no gain of energy",
+        coin_spins_down,
+    ),
 )

@@ -151,9 +151,7 @@ def make_bodies_workspace(
     made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, parts)
     acting = ActingBodies(made.body[:bodies], made.state, made.touched, made.fixed)
     return BodiesWorkspace(
-        bodies=made._replace(
-            capsules=capsules, cylinders=cylinders, parts=make_parts(bodies, parts, contacts, acting)
-        ),
+        bodies=made._replace(capsules=capsules, cylinders=cylinders, parts=make_parts(bodies, parts, contacts, acting)),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),

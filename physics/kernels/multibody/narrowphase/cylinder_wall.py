@@ -108,11 +108,17 @@ def _add_ring(b, end, wall, lowest, height, margin, h, many):
 @inlined
 def _may_lie_flat(b, end, lowest, gap, height, wall, h, many):
     """True if the highest point of a rim of cylinder b may reach a wall within h [s]; arguments as of `_add_ring`."""
-    n, y, body = row_vector(many.walls, wall, WALL_NORMAL), axis_of(row_matrix(many.bodies.rotation, b)), body_of(b, many)
+    n, y, body = (
+        row_vector(many.walls, wall, WALL_NORMAL),
+        axis_of(row_matrix(many.bodies.rotation, b)),
+        body_of(b, many),
+    )
     highest = minus(times(2.0 * (2.0 * end - 1.0) * many.bodies.body[b].dims[1], y), lowest)
     fall = h * min(0.0, _speed_along(body, from_body(b, highest, many), n, many))
     fall -= _FALL_SHARE * h * h * many.bodies.body[body].acceleration
-    return gap + height + fall <= many.bodies.body[body].slop or height <= 2.0 * _FLAT_SINE * many.bodies.body[b].dims[0]
+    return (
+        gap + height + fall <= many.bodies.body[body].slop or height <= 2.0 * _FLAT_SINE * many.bodies.body[b].dims[0]
+    )
 
 
 @if_given("many.bodies.cylinders", False)

@@ -96,9 +96,9 @@ def _centripetal(b, k, first, side, h, many):
     """Acceleration ω x ṙ of part b's point in contact k, world frame [m/s²].
 
     Of a sphere it is that of its centre, under which the contact point stays: 0 unless it is a part of a compound. Of a
-    capsule it is that of the ball's centre, since its point stays under a point of its axis. That of a cylinder includes
-    α x r for the angular acceleration α of free turning, which points of thin disks feel. It is also 0 if the body
-    turns by more than `MAX_TARGET_TURN` in a stage of length h [s], or its point rolls so far, since it then says
+    capsule it is that of the ball's centre, since its point stays under a point of its axis. That of a cylinder
+    includes α x r for the angular acceleration α of free turning, which points of thin disks feel. It is also 0 if the
+    body turns by more than `MAX_TARGET_TURN` in a stage of length h [s], or its point rolls so far, since it then says
     nothing about the stage's end.
     `first` is the column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
@@ -178,9 +178,9 @@ def set_resting_targets(n, h, many):
 
     They follow `contact_law.target_velocity.set_resting_targets`. A contact with a gap at the start may close the rest
     of it, measured at the middle, in the second half of the stage. Under error control, the gap that a point gains only
-    by its motion on a circle is left out: it would cause an error of first order in the velocity. Targets of points that
-    roll are not clamped: the clamp of one that hardly moves is on in one stage and off in the next. Such a stage is
-    still checked for a gain of energy.
+    by its motion on a circle is left out: it would cause an error of first order in the velocity. Targets of points
+    that roll are not clamped: the clamp of one that hardly moves is on in one stage and off in the next. Such a stage
+    is still checked for a gain of energy.
     """
     half, long = 0.5 * h, closing_time(h, many)
     for k in range(n):
