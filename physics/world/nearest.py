@@ -142,5 +142,5 @@ def check_shape(shape: Body | None, scene: Scene) -> None:
     """Refuse a shape that is neither a point nor a sphere in a scene with cylinders."""
     if shape is not None and shape.kind != "sphere" and any("cylinder" in _kinds(body) for body in scene.bodies):
         raise ValueError(
-            f"shape is {shown(shape)}, and Scene.bodies holds a cylinder; allowed with it are a sphere and None, a point"
+            f"shape is {shown(shape)}, and Scene.bodies holds a cylinder; allowed with it are spheres and points"
         )

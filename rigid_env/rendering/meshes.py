@@ -155,7 +155,7 @@ def cylinder_mesh(dimensions):
     radius, half, n = dimensions[0], dimensions[1], CYLINDER_SIDES
     angles = 2.0 * np.pi * np.arange(n) / n
     ring = radius * np.stack([np.cos(angles), np.zeros(n), np.sin(angles)], axis=1)
-    rings = [ring + (0.0, y, 0.0) for y in (half, 0.0, -half)]
+    rings = [ring + np.array([0.0, y, 0.0]) for y in (half, 0.0, -half)]
     top, bottom, faces = 3 * n, 3 * n + 1, []
     for k in range(n):
         j = (k + 1) % n

@@ -101,7 +101,7 @@ def _capsule_outlines(pos, R, size):
 
 
 def _hull_outlines(body, R):
-    """Outlines of one hull or cylinder: for each sample of the sun the convex hull of its corners, projected along the light."""
+    """Outlines of one hull or cylinder: for each sample of the sun the convex hull of its mesh, along the light."""
     corners = body.pos + body_mesh(body).vertices @ R.T
     loops = []
     for light in SUN_SAMPLES:

@@ -39,7 +39,8 @@ class Part:
     Parameters
     ----------
     vertices : (v, 3) float32
-        Corners, body frame: of a hull, capsule or cylinder in [m], of other shapes to be multiplied by the body's dimensions.
+        Corners, body frame: of a hull, capsule or cylinder in [m], of other shapes to be multiplied by the body's
+        dimensions.
     faces : (f, 3) uint32
         Indices of each triangle's corners, counter-clockwise as seen from outside.
     lightening : float

@@ -98,17 +98,17 @@ def leaning(share: float, direction: float, time: float, preset="balanced", dt=0
 
 @pytest.mark.parametrize("direction", [0.0, 0.39, 2.0])
 def test_a_cylinder_stands_below_the_critical_angle(direction):
-    """One point of the ring lies where loads would tip it, so that it stands up to the critical angle in each direction."""
+    """One point of the ring lies where loads would tip it, so that the critical angle is that of each direction."""
     world = leaning(0.999, direction, 0.25)
     assert np.abs(world.pos[0, 0] - (0, 0.15, 0)).max() < 1e-9
     assert np.abs(world.angvel).max() < 1e-7
 
 
 def tipped(preset: str, dt: float) -> tuple[float, float]:
-    """Errors of place [m] and spin [rad/s] of a cylinder on a slope 10 % above the critical one, which tips over its rim.
+    """Errors of place [m] and spin [rad/s] of a cylinder that tips over its rim: its slope is 10 % above the critical.
 
-    With the distance R of the centre from the rim, it turns about the lowest point by R² φ''(1 + k) = g R sin(s - c + φ):
-    s is the slope, c the critical one.
+    With the distance R of the centre from the rim, and the moment of inertia I about it, it turns about this
+    point by I φ'' = m g R sin(s - c + φ): s is the slope, c the critical one.
     """
     r, half, share, direction, time = 0.1, 0.15, 1.1, 0.39, 0.25
     slope, critical, far = math.atan(share * r / half), math.atan(r / half), math.hypot(r, half)
@@ -343,7 +343,7 @@ def test_queries_refuse_a_cylinder_beside_other_shapes_by_name():
     world = physics.World(physics.Scene(bodies, [FLOOR], effects_), dt=0.01)
     with pytest.raises(ValueError, match="one of them a cylinder; allowed with it are spheres"):
         world.measure_distances(0, 1)
-    with pytest.raises(ValueError, match=r"Scene\.bodies holds a cylinder; allowed with it are a sphere"):
+    with pytest.raises(ValueError, match=r"Scene\.bodies holds a cylinder; allowed with it are spheres"):
         world.nearest_to(physics.Block((1, 1, 1), 1.0), (0, 1, 0))
     with pytest.raises(ValueError, match="allowed are all convex shapes but cylinders"):
         world.nearest_to(physics.Cylinder(0.1, 0.3, 1.0), (0, 1, 0))

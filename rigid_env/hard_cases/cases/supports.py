@@ -150,13 +150,13 @@ def press(on: Setting) -> Sequence[Check]:
 def coin_spins_down(on: Setting) -> Sequence[Check]:
     """A coin on its face spins down at 2 μ g/r by friction at its rim; on its edge it falls, and never gains energy.
 
-    On the face, points of the rim carry all the load, so that friction has the torque μ m g r, and the moment of inertia
-    is m r²/2: ω = ω₀ - 2 μ g t/r, until it rests. Each step of length h leaves at most a share ε of the speed that loads
-    give. Friction opposes the slip of points that turn by ω h/2 until the end of the step, so that it is less by a share
-    (ω h/2)²/2 at most. The energy is m r² ω²/4, so that its error is m r² ω/2 times that of ω.
+    On the face, points of the rim carry all the load, so that friction has the torque μ m g r, and the moment of
+    inertia is m r²/2: ω = ω₀ - 2 μ g t/r, until it rests. Each step of length h leaves at most a share ε of the speed
+    that loads give. Friction opposes the slip of points that turn by ω h/2 until the end of the step, so that it is
+    less by a share (ω h/2)²/2 at most. The energy is m r² ω²/4, so that its error is m r² ω/2 times that of ω.
 
-    Then the coin stands on its edge, leans by 0.3 rad, and turns at 12 rad/s. It is too slow to stay up: it falls, rolls
-    on its rim ever faster, and slips. Friction only takes energy. A solve that leaves ε of the speed may give ε of it.
+    Then the coin stands on its edge, leans by 0.3 rad, and turns at 12 rad/s. It is too slow to stay up: it falls,
+    rolls on its rim ever faster, and slips. Friction only takes energy. A solve that leaves ε of the speed may give ε of it.
     """
     r, mu, spin = COIN.radius, 0.2, 40.0
     world = on.world(physics.Scene([replace(COIN, angvel=(0, spin, 0))], [FLOOR], laws(0.0, mu)))
