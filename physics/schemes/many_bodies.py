@@ -37,7 +37,7 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed ones; also for all but blocks, balls and ellipsoids at walls.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls, capsules and others at walls.
 
     Bodies at walls that are tied by springs are stepped here, too.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from physics.accuracy import Accuracy
 from physics.kernels.state.contact_law_dispatch import (
     LAW_ANISOTROPY,
@@ -78,17 +80,18 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against a cylinder that may touch another body; "" if none can."""
+    """Message against a cylinder that may touch another body than a sphere; "" if none can."""
     if not (needs.meeting and needs.cylinders):
         return ""
     between = needs.contact.between_bodies
     pairs = touching_pairs(scene, between)
     pairs = potential_pairs(scene, between) if pairs is None else pairs
-    for b, body in enumerate(scene.bodies):
-        if any(part.kind == "cylinder" for part in with_parts([body])) and pairs[b, : len(scene.bodies)].any():
-            other = int(pairs[b, : len(scene.bodies)].argmax())
+    kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
+    for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
+        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
             return (
                 f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; a cylinder touches walls "
-                "only: allowed are Contact(between_bodies=False) with bodies that move, and groups that keep both apart"
+                "and spheres: allowed are Contact(between_bodies=False) where no fixed body is met, and groups that "
+                "keep both apart"
             )
     return ""

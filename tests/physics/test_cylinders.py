@@ -23,6 +23,7 @@ from tests.reference.cylinders import (
     steady_precession,
     tilted,
 )
+from tests.reference.edges import GRAVITY, BallOnBall
 
 pytestmark = pytest.mark.interpreted
 
@@ -204,6 +205,41 @@ def test_a_disk_without_friction_moves_as_the_equations_say():
 @pytest.mark.parametrize("law", MU)
 def test_a_tilted_disk_moves_precisely(law):
     assert disk_error(law, "precise", 0.005, 0.05) < 1e-9
+
+
+@pytest.mark.parametrize(("steps", "bound"), [(250, 8e-5), (500, 2e-5)])
+@pytest.mark.parametrize("on", ["side", "ball", "rim"])
+def test_a_ball_and_a_cylinder_part_as_a_ball_leaves_a_ball(on, steps, bound):
+    """A ball slides off the side or rim of a fixed cylinder, or a cylinder on its side off a ball: of second order."""
+    true, corner = BallOnBall(), np.zeros(3)
+    time, top = true.leaving[0] + 0.3, true.radius * np.array([math.sin(true.start), math.cos(true.start), 0])
+    small = true.radius - 1.0
+    if on == "side":
+        bodies = [physics.Cylinder(1.0, 1.0, fixed=True, quat=ALONG_Z), physics.Sphere(small, 0.7, pos=top)]
+    elif on == "ball":
+        bodies = [physics.Sphere(1.0, fixed=True), physics.Cylinder(small, 1.0, 0.7, pos=top, quat=ALONG_Z)]
+    else:
+        corner = np.array([2.0, 0.5, 0.0])
+        bodies = [physics.Cylinder(2.0, 1.0, fixed=True), physics.Sphere(true.radius, 0.7, pos=corner + top)]
+    world = world_of(*bodies, walls=(), laws=[physics.Gravity((0, -GRAVITY, 0)), physics.Contact()], dt=time / steps)
+    world.step(steps=steps)
+    np.testing.assert_allclose(world.pos[0, 1] - corner, [*true.place_after_leaving(0.3), 0], atol=bound)
+
+
+def on_turning_cylinder(dt: float) -> float:
+    """Gap of a ball on a cylinder that turns under it, both without gravity, where nothing pulls them apart [m]."""
+    body = physics.Cylinder(0.5, 0.6, 3.0, quat=(0.8, 0, 0.6, 0), angvel=(0.7, 0.4, -1.1))
+    ball = physics.Sphere(0.2, 1.0, pos=(0, 0.5, 0.1), linvel=(0.3, -0.5, 0.2))
+    world = world_of(body, ball, walls=(), laws=[physics.Contact(), physics.Friction(0.3)], dt=dt)
+    worst = 0.0
+    for _ in range(round(0.5 / dt)):
+        world.step()
+        worst = max(worst, -float(world.measure_distances(0, 1).gap[0, 0]))
+    return worst
+
+
+def test_a_ball_stays_on_a_cylinder_that_turns_under_it():
+    assert on_turning_cylinder(0.005) < 2e-5
 
 
 # --- rest and energy -------------------------------------------------------------------------------------------------

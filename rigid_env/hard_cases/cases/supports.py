@@ -156,7 +156,8 @@ def coin_spins_down(on: Setting) -> Sequence[Check]:
     less by a share (ω h/2)²/2 at most. The energy is m r² ω²/4, so that its error is m r² ω/2 times that of ω.
 
     Then the coin stands on its edge, leans by 0.3 rad, and turns at 12 rad/s. It is too slow to stay up: it falls,
-    rolls on its rim ever faster, and slips. Friction only takes energy. A solve that leaves ε of the speed may give ε of it.
+    rolls on its rim ever faster, and slips. Friction only takes energy. A solve that leaves ε of the speed may give
+    ε of it.
     """
     r, mu, spin = COIN.radius, 0.2, 40.0
     world = on.world(physics.Scene([replace(COIN, angvel=(0, spin, 0))], [FLOOR], laws(0.0, mu)))

@@ -13,6 +13,7 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
+from physics.kernels.multibody.data.cylinder_balls import normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rim_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
@@ -369,15 +370,15 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 @inlined
 def rolls_on_rim(k, b, many):
-    """True if body or part b is a cylinder whose point in contact k rolls along a rim."""
-    return is_cylinder(b, many) and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
+    """True if body or part b is a cylinder whose point in contact k, with a wall, rolls along a rim."""
+    is_at_wall = is_cylinder(b, many) and body_at(many.contacts.bodies[k, 1], many) < 0
+    return is_at_wall and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
 
 
 @if_given("many.bodies.cylinders", False)
 def may_roll(k, many):
-    """True if a point of contact k rolls along a rim of a cylinder."""
-    end = body_at(many.contacts.bodies[k, 1], many)
-    return rolls_on_rim(k, first_part(k, many), many) or (end >= 0 and rolls_on_rim(k, second_part(end, k, many), many))
+    """True if the point of contact k rolls along a rim of a cylinder."""
+    return rolls_on_rim(k, first_part(k, many), many)
 
 
 @inlined
@@ -409,7 +410,7 @@ def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its parts a and b; return its normal, world frame.
 
     A normal with an owner turns with it. The normal of two spheres stays along the line of their centres, and
-    that of two balls of capsules likewise. Any other normal stays as it is.
+    that of two balls of capsules likewise, and that of a ball stays across a cylinder. Any other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -423,6 +424,9 @@ def _turn_frame(k, a, b, many):
             write_contact_frame(k, n, many)
     elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
         n = normal_between_axes(k, a, b, n, many)
+        write_contact_frame(k, n, many)
+    elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
+        n = normal_beside_cylinder(k, a, b, n, many)
         write_contact_frame(k, n, many)
     return n
 

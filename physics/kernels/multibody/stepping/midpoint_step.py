@@ -36,6 +36,7 @@ from physics.kernels.multibody.data.contact_set import (
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.cylinder_balls import less_turn_beside_cylinder
 from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rim_arm_rate
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
@@ -167,6 +168,7 @@ def _turning(k, b, h, many):
     t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
     t = (t[0] - half * _turn_of_line(one, other, many), t[1], t[2])
     t = less_turn_of_axes(k, one, other, half, t, many)
+    t = less_turn_beside_cylinder(k, one, other, half, t, many)
     if many.settings[0].is_error_controlled == 1 or has_fixed(many):
         t = (t[0] + h * _coriolis(k, many), t[1], t[2])
     return t
