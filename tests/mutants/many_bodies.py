@@ -71,6 +71,14 @@ DATA = [
         "physics/test_cylinders.py::test_a_tilted_disk_moves_as_the_equations_say",
     ),
     _mutant(
+        "data-cylinder-ball",
+        "The normal of a ball on a cylinder turns, but the gap does not feel how.",
+        "data/cylinder_balls.py",
+        "return (target[0] - time * _turn_beside(can, ball, many), target[1], target[2])",
+        "return target",
+        "physics/test_cylinders.py::test_a_ball_slides_on_a_cylinder_that_turns_under_it",
+    ),
+    _mutant(
         "data-free-turn",
         "The contact point of a cylinder does not feel how its spin turns.",
         "data/cylinders.py",

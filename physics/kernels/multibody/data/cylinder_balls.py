@@ -24,7 +24,7 @@ def _rotation(b, many):
 
 @inlined
 def _from_side_and_end(dims, y):
-    """How far a point y is out of the side and of the end of a cylinder [m], and the direction across the axis."""
+    """Heights of a point y over the side and the end of a cylinder [m], and the direction from the axis."""
     across = math.sqrt(y[0] * y[0] + y[2] * y[2])
     out = (y[0] / across, 0.0, y[2] / across) if across > 0.0 else (1.0, 0.0, 0.0)
     return across - dims[0], abs(y[1]) - dims[1], out
