@@ -150,7 +150,7 @@ def disk_start(law: str) -> np.ndarray:
     return start
 
 
-MU = {"circle": 0.8, "rolling": 2.0, "free": 0.0, "sliding": 0.2}
+MU = {"circle": 0.8, "rolling": 3.0, "free": 0.0, "sliding": 0.2}
 
 
 def disk_error(law: str, preset: str, dt: float, time: float = 0.1) -> float:
