@@ -33,7 +33,11 @@ def is_cylinder(b, many):
     return many.bodies.body[b].shape == CYLINDER
 
 
-@if_given("many.bodies.cylinders", False)
+def _without_cylinders(many):
+    return False
+
+
+@if_given("many.bodies.cylinders", _without_cylinders)
 def has_cylinders(many):
     """True in a world with cylinders."""
     return True
