@@ -227,7 +227,7 @@ def test_a_ball_and_a_cylinder_part_as_a_ball_leaves_a_ball(on, steps, bound):
 
 
 def on_turning_cylinder(dt: float) -> tuple[float, float]:
-    """Errors of place [m] and velocity [m/s] of a ball that slides without friction on a roller, which turns about world y.
+    """Errors of place [m] and velocity [m/s] of a ball that slides without friction on a roller that turns about y.
 
     The axis a of the roller turns at Ω: a = (cos Ω t, 0, -sin Ω t). With s = x·a, the distance φ of the ball's centre x
     from the axis stays R, its direction is n = (x - s a)/R, and φ² = x·x - s². So its acceleration g + λ n has
