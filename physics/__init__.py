@@ -26,6 +26,7 @@ from physics.scene import canonical_scenes as scenes
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_field import Field, field_function
 from physics.scene.force_fields import AngularDrag, Buoyancy, Drag, Magnus, Push, Spring, Wind
@@ -61,6 +62,7 @@ __all__ = [
     "Compound",
     "Contact",
     "Contacts",
+    "Cylinder",
     "Diagnostics",
     "Drag",
     "Ellipsoid",

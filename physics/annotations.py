@@ -11,7 +11,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 """Four floats (w, x, y, z), as bodies store an attitude; users may give any sequence or array of four numbers."""
 
-Shape = Literal["block", "sphere", "ellipsoid", "hull", "capsule", "compound"]
+Shape = Literal["block", "sphere", "ellipsoid", "hull", "capsule", "cylinder", "compound"]
 """Name of the shape of a body, as in `Body.kind`."""
 
 Frame = Literal["world", "body"]

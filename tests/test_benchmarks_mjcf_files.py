@@ -8,14 +8,16 @@ from typer.testing import CliRunner
 
 import physics
 from benchmarks import mjcf_files
-from tests.physics.mjcf_texts import HINGE, READ, box, floor, model
+from tests.physics.mjcf_texts import HILLS, HINGE, READ, box, floor, model
 
 pytest.importorskip("mujoco", minversion="3.3.7")
 
 FILES = {
     "a/read.xml": READ["keyframe"],
-    "a/table.xml": model(box(), world='<geom name="t" type="cylinder" size="1 1"/>'),
-    "b/bench.xml": model(box(), world=floor() + '<geom name="b" type="cylinder" size="1 1"/>'),
+    "a/table.xml": model(box(), world='<geom name="t" type="hfield" hfield="h"/>', before=f"<asset>{HILLS}</asset>"),
+    "b/bench.xml": model(
+        box(), world=floor() + '<geom name="b" type="hfield" hfield="h"/>', before=f"<asset>{HILLS}</asset>"
+    ),
     "b/leg.xml": model(box() + HINGE),
     "fixed.xml": f"<mujoco><worldbody>{floor()}</worldbody></mujoco>",
     "part.xml": "<mujocoinclude/>",
@@ -42,11 +44,11 @@ def run(*arguments):
 
 def test_each_file_is_counted_once_with_its_reason(folder, tmp_path):
     output = run(folder, "--json", tmp_path / "found.json")
-    assert "a/table.xml: line 4: <geom 't'> is a fixed cylinder; allowed of the world are plane, box" in output
+    assert "a/table.xml: line 4: <geom 't'> is a fixed hfield; allowed of the world are plane, box" in output
     assert "of 3 with free bodies alone 1 are read, 0 of them silently another" in output
     kept = json.loads((tmp_path / "found.json").read_text())
     assert kept["kinds"] == {"read": 1, "refused": 2, "other joints, too": 1, "no free body": 1, "no model": 1}
-    assert kept["reasons"] == {"<geom> is a fixed cylinder": 2}
+    assert kept["reasons"] == {"<geom> is a fixed hfield": 2}
     assert [row["file"] for row in kept["rows"]] == ["a/read.xml", "a/table.xml", "b/bench.xml"]
     assert str(tmp_path) not in (tmp_path / "found.json").read_text()
 

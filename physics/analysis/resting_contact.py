@@ -65,7 +65,7 @@ def resting_contact(
     Raises
     ------
     ValueError
-        An index out of range, a wrench of the wrong shape or not finite, a body that is a hull, capsule or
+        An index out of range, a wrench of the wrong shape or not finite, a body that is a hull, capsule, cylinder or
         compound, or a scene whose bodies touch each other.
     """
     if not (0 <= index < world.worlds and 0 <= body < world.body_count):
@@ -75,7 +75,7 @@ def resting_contact(
     if world.plan.scheme.couples_bodies:
         raise ValueError("world has contact between bodies; allowed here are scenes with Contact(between_bodies=False)")
     kind = world.scene.bodies[body].kind
-    if kind in ("hull", "capsule", "compound"):
+    if kind in ("hull", "capsule", "cylinder", "compound"):
         raise ValueError(f"body is {body}, a {kind}; allowed are blocks, spheres and ellipsoids")
     load = np.zeros(6) if wrench is None else validation.finite(wrench, (6,), "wrench")
     i = index * world.body_count + body

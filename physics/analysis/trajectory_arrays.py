@@ -14,6 +14,7 @@ from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.body_names import body_names
 from physics.scene.capsule import Capsule
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import Contact
 from physics.scene.scene import HalfSpace, Scene
 
@@ -142,6 +143,9 @@ def _body(kind, mass, inertia, dimensions, center, corners, more) -> Body:
     if kind == "capsule":
         radius, half = dimensions[:2]
         return Capsule(radius, 2.0 * (half - radius), **given)
+    if kind == "cylinder":
+        radius, half = dimensions[:2]
+        return Cylinder(radius, 2.0 * half, **given)
     if kind == "hull":
         return Hull(corners, **given)
     raise ValueError(f"its scene has a body of kind {kind!r}")

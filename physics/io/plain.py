@@ -16,6 +16,7 @@ from physics.keywords import nearest_first
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
 from physics.scene.compound import PARTS, Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import Actuator, Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
 from physics.scene.force_fields import FIELDS
 from physics.scene.motion import Motion
@@ -23,7 +24,7 @@ from physics.scene.scene import HalfSpace, Scene
 from physics.scene.sensor import Sensor
 from physics.summary import shown
 
-BODIES = (Block, Sphere, Ellipsoid, Capsule, Hull, Compound)
+BODIES = (Block, Sphere, Ellipsoid, Capsule, Cylinder, Hull, Compound)
 EFFECTS = (Gravity, Contact, Friction, RollingFriction, SpinFriction, Actuator, Sleeping, *FIELDS)
 KINDS: dict[str, tuple[type, ...]] = {
     "bodies": BODIES,

@@ -94,6 +94,16 @@ def capsule_moments(dimensions: np.ndarray, mass: float | np.ndarray) -> np.ndar
     return np.stack([across, along, across], axis=-1)
 
 
+def cylinder_moments(dimensions: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
+    """Principal moments (..., 3) [kg m²] of solid cylinders along body y, of `mass` (...) [kg].
+
+    `dimensions` (..., 3) are half extents (r, l, r) [m]: M r²/2 along the axis, M (r²/4 + l²/3) across it.
+    """
+    r, half = dimensions[..., 0], dimensions[..., 1]
+    across, along = mass * (r * r / 4 + half * half / 3), mass * (r * r / 2)
+    return np.stack([across, along, across], axis=-1)
+
+
 def _plane_symmetric(axes: np.ndarray, mass: float | np.ndarray) -> np.ndarray:
     """Products (b² + c², a² + c², a² + b²) mass (..., 3), where `axes` (..., 3) are (a, b, c).
 

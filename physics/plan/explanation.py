@@ -40,6 +40,7 @@ def _contact_row(scene, contact) -> Row:
     if contact is not None and scene.walls:
         kinds = {body.kind for body in with_parts(scene.bodies)}
         also = ", corners of hulls" * ("hull" in kinds) + ", ends of capsules" * ("capsule" in kinds)
+        also += ", rims of cylinders" * ("cylinder" in kinds)
         also += ", parts of compounds" * ("compound" in kinds)
         return Row("wall contact", True, f"declared; {len(scene.walls)} wall(s)", f"detection{also}, impacts, solver")
     if contact is not None:
@@ -51,7 +52,9 @@ def _contact_row(scene, contact) -> Row:
 def _between_row(scene, contact, many) -> Row:
     if many:
         kinds = {body.kind for body in with_parts(scene.bodies)}
-        also = "".join(f", {kind}s" for kind in ("ellipsoid", "capsule", "hull", "compound") if kind in kinds)
+        also = "".join(
+            f", {kind}s" for kind in ("ellipsoid", "capsule", "cylinder", "hull", "compound") if kind in kinds
+        )
         return Row(
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )

@@ -41,8 +41,8 @@ class Plan(Switches):
         return (
             self.contact, self.friction, self.restitution, self.gravity, self.gyroscopic, self.offset_frame,
             self.pivots, self.integrator is None, self.scheme.name, self.scheme.is_error_controlled, self.ellipsoids,
-            self.hulls, self.capsules, self.compounds, self.sleeping, self.fixed, self.lone, self.grouped,
-            self.features,
+            self.hulls, self.capsules, self.cylinders, self.compounds, self.sleeping, self.fixed, self.lone,
+            self.grouped, self.features,
             self.material_columns > 0, self.walls_differ, self.pair_materials, self.motion_columns > 0, *self.laws,
             *(term.marker for term in self.terms),
         )  # fmt: skip
@@ -111,6 +111,7 @@ def make_plan(scene: Scene, accuracy: Preset | Accuracy) -> Plan:
         ellipsoids=needs.ellipsoids or None,
         hulls=needs.hulls or None,
         capsules=needs.capsules or None,
+        cylinders=needs.cylinders or None,
         compounds=needs.compounds or None,
         sleeping=needs.sleeping or None,
         features=needs.features,

@@ -74,7 +74,7 @@ def body_repr(body: Body) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Body(_Shape):
-    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid`, `Capsule`, `Hull` or `Compound`.
+    """Base of all bodies; use `Block`, `Sphere`, `Ellipsoid`, `Capsule`, `Cylinder`, `Hull` or `Compound`.
 
     Parameters
     ----------
@@ -129,7 +129,9 @@ class Body(_Shape):
 
     def __post_init__(self) -> None:
         if type(self) is Body:
-            raise TypeError("Body has no shape; allowed are Block, Sphere, Ellipsoid, Capsule, Hull, Compound")
+            raise TypeError(
+                "Body has no shape; allowed are Block, Sphere, Ellipsoid, Capsule, Cylinder, Hull, Compound"
+            )
         if not isinstance(self.fixed, (bool, np.bool_)):
             raise ValueError(f"fixed is {shown(self.fixed)}; allowed are True and False")
         self._set("fixed", bool(self.fixed))

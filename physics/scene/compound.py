@@ -17,11 +17,12 @@ from physics.mass.inertia import MassProperties, compose
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import FROM_DENSITY, Block, Body, Ellipsoid, Hull, Sphere, body_repr
 from physics.scene.capsule import Capsule
+from physics.scene.cylinder import Cylinder
 from physics.scene.groups import GROUP, MASK
 from physics.scene.motion import Motion
 from physics.summary import shown
 
-PARTS = (Block, Sphere, Ellipsoid, Capsule, Hull)
+PARTS = (Block, Sphere, Ellipsoid, Capsule, Cylinder, Hull)
 """Classes of the parts of a compound."""
 
 # Fields of a body that a part has; all others are those of the whole compound.
@@ -55,6 +56,8 @@ class PlacedPart(NamedTuple):
             return np.abs(self.R) @ d
         if isinstance(self.part, Capsule):
             return np.abs(self.R[:, 1]) * (d[1] - d[0]) + d[0]
+        if isinstance(self.part, Cylinder):
+            return np.abs(self.R[:, 1]) * d[1] + np.hypot(self.R[:, 0], self.R[:, 2]) * d[0]
         return np.sqrt((self.R * d) ** 2 @ np.ones(3))
 
     @property
@@ -69,6 +72,8 @@ class PlacedPart(NamedTuple):
         if isinstance(self.part, Capsule):
             ends = centre + np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]]) * (d[1] - d[0])
             return float(np.linalg.norm(ends, axis=1).max() + d[0])
+        if isinstance(self.part, Cylinder):
+            return float(np.hypot(abs(centre[1]) + d[1], np.hypot(centre[0], centre[2]) + d[0]))
         corners = self.part.polyhedron.vertices if isinstance(self.part, Hull) else np.array(_CORNERS) * d
         return float(np.linalg.norm(centre + corners, axis=1).max())
 
@@ -90,9 +95,9 @@ class Compound(Body):
     Parameters
     ----------
     parts : sequence of Body
-        At least one `Block`, `Sphere`, `Ellipsoid`, `Capsule` or `Hull`. Velocities, name, coefficients, groups and
-        motion are those of the compound, and parts have none. Parts of a fixed compound may all be fixed, too; then
-        the centre of mass is that of equal densities.
+        At least one `Block`, `Sphere`, `Ellipsoid`, `Capsule`, `Cylinder` or `Hull`. Velocities, name, coefficients,
+        groups and motion are those of the compound, and parts have none. Parts of a fixed compound may all be fixed,
+        too; then the centre of mass is that of equal densities.
     mass : float
         Mass of the whole [kg]; the masses of all parts are then scaled to it. None: their sum.
 

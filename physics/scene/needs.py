@@ -54,7 +54,8 @@ class Needs:
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
     lone : bool
-        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound.
+        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound. Also whether it is a
+        cylinder that can touch walls.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
@@ -119,9 +120,18 @@ class Needs:
         return self.touching and "capsule" in self.kinds
 
     @property
+    def cylinders(self) -> bool:
+        """True if cylinders can touch walls or other bodies."""
+        return self.touching and "cylinder" in self.kinds
+
+    @property
     def compounds(self) -> bool:
         """True if compounds can touch walls or other bodies."""
         return self.touching and "compound" in self.kinds
+
+
+def _is_lone(moving: int, kinds: frozenset[str], touching: bool, at_fixed: bool) -> bool:
+    return moving == 1 and "compound" not in kinds and (at_fixed or (touching and "cylinder" in kinds))
 
 
 def is_isotropic(moments: np.ndarray) -> Any:
@@ -153,7 +163,7 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
-        lone=meeting and fixed and len(axes) == 1 and "compound" not in kinds,
+        lone=_is_lone(len(axes), kinds, touching, meeting and fixed),
         grouped=grouped,
         motion_columns=motion_columns,
         linked=any(slot.term.is_linked for slot in fields),
@@ -185,7 +195,7 @@ def _meetings(scene: Scene, contact: Contact | None, fixed: bool) -> tuple[bool,
 
 def _laws(scene: Scene, contact: Any, friction: Friction | None) -> tuple[str, ...]:
     """Names of the contact laws in `physics.kernels.state.contact_law_dispatch.LAWS` that act at the scene's walls."""
-    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule") for body in with_parts(scene.bodies))
+    has_round = any(body.kind in ("sphere", "ellipsoid", "capsule", "cylinder") for body in with_parts(scene.bodies))
     is_on = {
         LAW_TANGENTIAL: contact.tangential is not None,
         LAW_ROLLING: has_round and scene.effect(RollingFriction) is not None,

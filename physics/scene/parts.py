@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from physics.kernels.multibody.data.parts import Part
-from physics.kernels.state.layout import BLOCK, CAPSULE, COMPOUND, ELLIPSOID, HULL, SPHERE
+from physics.kernels.state.layout import BLOCK, CAPSULE, COMPOUND, CYLINDER, ELLIPSOID, HULL, SPHERE
 from physics.scene.bodies import Body
 from physics.scene.compound import Compound
 
@@ -16,6 +16,7 @@ SHAPE_CODES = {
     "hull": HULL,
     "capsule": CAPSULE,
     "compound": COMPOUND,
+    "cylinder": CYLINDER,
 }
 
 

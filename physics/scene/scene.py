@@ -18,6 +18,7 @@ from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
 from physics.scene.capsule import Capsule
 from physics.scene.compound import Compound
+from physics.scene.cylinder import Cylinder
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups
@@ -253,7 +254,7 @@ class Scene:
             each.check(len(self.bodies))
             check_ends(each, self.bodies)
         for b, body in enumerate(self.bodies):
-            is_without_axes = body.kind in ("hull", "capsule", "compound") and not body.fixed
+            is_without_axes = body.kind in ("hull", "capsule", "cylinder", "compound") and not body.fixed
             unknown = [type(each).__name__ for each in fields if each.needs_axes and is_without_axes]
             if unknown:
                 raise ValueError(
@@ -295,5 +296,5 @@ def _frames_of_package() -> int:
 def _names(allowed: Any) -> str:
     kinds = allowed if isinstance(allowed, tuple) else (allowed,)
     if allowed is Body:
-        kinds = (Block, Sphere, Ellipsoid, Capsule, Hull, Compound)
+        kinds = (Block, Sphere, Ellipsoid, Capsule, Cylinder, Hull, Compound)
     return ", ".join(kind.__name__ for kind in kinds)

@@ -18,6 +18,9 @@ def support(body: Body, direction: np.ndarray) -> np.ndarray:
     if body.kind == "capsule":
         radius, reach = body.dimensions[:2]
         return (reach - radius) * np.abs(direction[..., 1]) + radius
+    if body.kind == "cylinder":
+        radius, half = body.dimensions[:2]
+        return half * np.abs(direction[..., 1]) + radius * np.hypot(direction[..., 0], direction[..., 2])
     scaled = direction * body.dimensions
     if body.kind == "block":
         return np.abs(scaled).sum(axis=-1)

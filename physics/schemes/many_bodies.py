@@ -37,7 +37,7 @@ def _meetings(scene: Scene, switches: Switches) -> int:
 
 
 class ManyBodies(Scheme):
-    """Scheme for bodies that touch each other or fixed ones; also for hulls, capsules and compounds at walls.
+    """Scheme for bodies that touch each other or fixed ones; also for hulls, capsules and others at walls.
 
     Bodies at walls that are tied by springs are stepped here, too.
 
@@ -57,16 +57,18 @@ class ManyBodies(Scheme):
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
-        is_coupled = is_coupled or needs.compounds
+        is_coupled = is_coupled or needs.compounds or needs.cylinders
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
+        found = objections.to_cylinders(scene, needs)
+        if not found and self.is_error_controlled:
+            found = objections.to_laws_of_stages(needs)
         if not found and (names := objections.declared_laws(needs)):
             found = (
                 f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, capsules, compounds, fixed bodies, groups "
-                "that keep some bodies from some walls, and Spring between bodies"
+                "with Contact(between_bodies=False), without hulls, capsules, cylinders, compounds, fixed bodies, "
+                "groups that keep some bodies from some walls, and Spring between bodies"
             )
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
@@ -78,7 +80,8 @@ class ManyBodies(Scheme):
         return allocation.make_bodies_workspace(
             bodies, walls if switches.contact else walls[:0], switches.terms, polyhedra(scene.bodies), fixed,
             groups=group_table(scene) if switches.grouped else None,
-            capsules=switches.capsules, parts=part_list(scene.bodies) if switches.compounds else (),
+            capsules=switches.capsules, cylinders=switches.cylinders,
+            parts=part_list(scene.bodies) if switches.compounds else (),
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             motion_columns=switches.motion_columns, lone=switches.lone, meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from physics.accuracy import Accuracy
 from physics.kernels.state.contact_law_dispatch import (
     LAW_ANISOTROPY,
@@ -10,7 +12,9 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_STIFFNESS,
     LAW_TANGENTIAL,
 )
+from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
+from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
 
 DECLARED = {
@@ -72,4 +76,22 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
             f"Accuracy.collisions is 'sequential' with scheme {accuracy.scheme!r}; allowed where bodies touch walls "
             "only is the scheme 'events', which knows the moment of a collision"
         )
+    return ""
+
+
+def to_cylinders(scene: Scene, needs: Needs) -> str:
+    """Message against a cylinder that may touch another body than a sphere; "" if none can."""
+    if not (needs.meeting and needs.cylinders):
+        return ""
+    between = needs.contact.between_bodies
+    pairs = touching_pairs(scene, between)
+    pairs = potential_pairs(scene, between) if pairs is None else pairs
+    kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
+    for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
+        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
+            return (
+                f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; a cylinder touches walls "
+                "and spheres: allowed are Contact(between_bodies=False) where no fixed body is met, and groups that "
+                "keep both apart"
+            )
     return ""

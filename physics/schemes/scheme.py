@@ -75,6 +75,8 @@ class Switches:
         Whether hulls can touch walls or bodies.
     capsules : True or None
         Whether capsules can touch walls or bodies.
+    cylinders : True or None
+        Whether cylinders can touch walls or bodies.
     compounds : True or None
         Whether compounds can touch walls or bodies.
     sleeping : True or None
@@ -110,6 +112,7 @@ class Switches:
     ellipsoids: bool | None
     hulls: bool | None
     capsules: bool | None
+    cylinders: bool | None
     compounds: bool | None
     sleeping: bool | None
     features: int

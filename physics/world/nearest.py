@@ -13,7 +13,8 @@ from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.queries.nearest_queries import Found
 from physics.kernels.state.layout import SPHERE
 from physics.scene.bodies import Body
-from physics.scene.parts import SHAPE_CODES
+from physics.scene.parts import SHAPE_CODES, with_parts
+from physics.scene.scene import Scene
 from physics.summary import parts_repr, shown
 from physics.world.query_arguments import result
 from physics.world.query_calls import CAPSULE
@@ -111,7 +112,35 @@ def shape_numbers(shape: Body | None) -> tuple[int, Any, float, Any, Any]:
     validation.instance(shape, Body, "shape", "a body such as physics.Sphere(...), or None for a point")
     if shape.kind == "compound":
         raise ValueError(f"shape is {shown(shape)}; allowed are convex shapes: ask for each part of a compound")
+    if shape.kind == "cylinder":
+        raise ValueError(f"shape is {shown(shape)}; allowed are all convex shapes but cylinders")
     solid = shape.polyhedron if shape.kind == "hull" else SOLIDS.get(shape.kind)  # type: ignore[attr-defined]
     radius = float(solid.radius) if shape.kind == "hull" else 0.0
     dims, center = (tuple(map(float, part)) for part in (shape.dimensions, shape.center))
     return SHAPE_CODES[shape.kind], dims, radius, center, solid
+
+
+def _kinds(body: Body) -> set[str]:
+    """Shapes of a body, or of its parts."""
+    return {part.kind for part in with_parts([body])}
+
+
+def check_pairs(first: np.ndarray, second: np.ndarray, scene: Scene) -> None:
+    """Refuse pairs of bodies of which one has a cylinder, and the other one another shape than a sphere."""
+    has_cylinder = [b for b, body in enumerate(scene.bodies) if "cylinder" in _kinds(body)]
+    for a, b in zip(first, second):
+        if b < 0 or not {a, b} & set(has_cylinder):
+            continue
+        if all(body.kind != "sphere" for body in (scene.bodies[a], scene.bodies[b])):
+            raise ValueError(
+                f"first and second hold the bodies {a} and {b}, one of them a cylinder; allowed with it are spheres, "
+                "walls and points"
+            )
+
+
+def check_shape(shape: Body | None, scene: Scene) -> None:
+    """Refuse a shape that is neither a point nor a sphere in a scene with cylinders."""
+    if shape is not None and shape.kind != "sphere" and any("cylinder" in _kinds(body) for body in scene.bodies):
+        raise ValueError(
+            f"shape is {shown(shape)}, and Scene.bodies holds a cylinder; allowed with it are spheres and points"
+        )

@@ -158,6 +158,8 @@ def change_inertia(params, bodies, plan, mass, size, inertia_body, shape) -> Non
             _check_spheres(halves[rows])
         if body.kind == "capsule":
             _check_capsules(halves[rows])
+        if body.kind == "cylinder":
+            _check_cylinders(halves[rows])
         if body.kind in ("hull", "compound"):
             _check_unscaled(b, body, halves[rows])
         if body.fixed:
@@ -219,6 +221,13 @@ def _check_capsules(halves) -> None:
     if len(bad):
         size = (2 * halves[bad[0]]).tolist()
         raise ValueError(f"size is {size} for a capsule; allowed are diameter, a larger length, the diameter again")
+
+
+def _check_cylinders(halves) -> None:
+    bad = np.flatnonzero(halves[:, 0] != halves[:, 2])
+    if len(bad):
+        size = (2 * halves[bad[0]]).tolist()
+        raise ValueError(f"size is {size} for a cylinder; allowed are diameter, height, the diameter again")
 
 
 def _check_unscaled(b, body, halves) -> None:

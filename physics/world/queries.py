@@ -14,7 +14,7 @@ from physics.parallel.exclusive import exclusive
 from physics.scene.bodies import Body
 from physics.world import choice
 from physics.world.batch import Batch
-from physics.world.nearest import Nearest, attitudes, nearest_result, pairs_of, shape_numbers
+from physics.world.nearest import Nearest, attitudes, check_pairs, check_shape, nearest_result, pairs_of, shape_numbers
 from physics.world.query_arguments import common_count, largest_distance, result, row_steps, vectors
 from physics.world.query_calls import QueryCalls
 from physics.world.ray_hits import RayHits
@@ -113,12 +113,14 @@ class Querying(Batch):
         Raises
         ------
         ValueError
-            A body, wall or world that does not exist, a body paired with itself, or different numbers of both.
+            A body, wall or world that does not exist, a body paired with itself, different numbers of both, or a
+            cylinder paired with another body than a sphere.
         RuntimeError
             Another thread is stepping or changing this world.
         """
         indices, asked = self._asked(worlds)
         a, b = pairs_of(first, second, self.body_count, len(self.walls))
+        check_pairs(a, b, self.scene)
         found, rows = nearest_result(out, asked, len(a))
         self._ask(measure_pairs, indices, Pairs(a, b), rows)
         return found
@@ -161,7 +163,8 @@ class Querying(Batch):
         Raises
         ------
         ValueError
-            A wrong shape, a number that is not finite, no unit quaternion, or a body or world that does not exist.
+            A wrong shape, a number that is not finite, no unit quaternion, a body or world that does not exist, or a
+            cylinder in the scene, where the shape is neither a point nor a sphere.
         RuntimeError
             Another thread is stepping or changing this world.
         """
@@ -169,6 +172,7 @@ class Querying(Batch):
         place, turn = vectors(pos, asked, "pos", "poses"), attitudes(quat, asked)
         count = common_count({"pos": place, "quat": turn}, "poses")
         code, dims, radius, center, solid = shape_numbers(shape)
+        check_shape(shape, self.scene)
         probe = Probe(
             code, dims, radius, center, place.reshape(-1, 3), turn.reshape(-1, 4), row_steps(place), row_steps(turn),
             count, largest_distance(max_distance), self._code(exclude, "exclude"),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from physics.kernels.parallel.work_stealing import make_ranges, make_taken_lists
-from physics.kernels.queries.query_scratch import QueriedBodies, QueryScratch, make_query_scratch
+from physics.kernels.queries.query_scratch import QueriedBodies, QueryScratch, RoundKinds, make_query_scratch
 from physics.kernels.state.groups import WorkQueue
 from physics.parallel.bound_call import BoundCall, bound_alike
 from physics.scene.parts import part_list, with_parts
@@ -40,7 +40,8 @@ class QueryCalls:
     def __init__(self, world: Batch):
         self._bodies = QueriedBodies(world.state, world.params, world.shapes)
         self._solids, self._walls = every_polyhedron(world.scene.bodies), world.walls
-        self._capsules = any(body.kind == "capsule" for body in with_parts(world.scene.bodies)) or None
+        kinds = {body.kind for body in with_parts(world.scene.bodies)}
+        self._kinds = RoundKinds("capsule" in kinds or None, "cylinder" in kinds or None)
         self._parts = part_list(world.scene.bodies)
         self._team, self._all = world.team, np.arange(world.worlds)
         self._scratch: dict[int, tuple[Any, list[QueryScratch]]] = {}
@@ -62,7 +63,8 @@ class QueryCalls:
         key, same = (kernel, is_all, id(solid)), _contents(question)
         scratches = self._scratch_for(solid)
         if key not in self._calls:
-            types = scratches[0].bodies.capsules, scratches[0].bodies.parts is None  # on which the kernel depends
+            bodies = scratches[0].bodies  # on whose types the kernel depends
+            types = bodies.capsules, bodies.cylinders, bodies.parts is None
             self._calls[key] = [
                 bound_alike(types, kernel, queue, places, self._bodies, scratch, *question)
                 for queue, scratch in zip(queues, scratches)
@@ -86,12 +88,10 @@ class QueryCalls:
             if len(self._scratch) == MOST_SOLIDS:
                 for kept in (self._scratch, self._calls, self._bound):
                     kept.clear()
-            capsules = True if solid is CAPSULE else self._capsules
+            kinds = self._kinds._replace(capsules=True) if solid is CAPSULE else self._kinds
             solids = [*self._solids, None if solid is CAPSULE else solid]
             bodies = len(self._solids) - len(self._parts)
-            made = [
-                make_query_scratch(bodies, self._walls, solids, capsules, self._parts) for _ in range(self._team.size)
-            ]
+            made = [make_query_scratch(bodies, self._walls, solids, kinds, self._parts) for _ in range(self._team.size)]
             self._scratch[id(solid)] = solid, made
         return self._scratch[id(solid)][1]
 

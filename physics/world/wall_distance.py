@@ -13,7 +13,7 @@ from physics.scene.groups import touching_pairs
 from physics.scene.support import support
 from physics.world.batch import Batch
 
-REACHED = ("hull", "capsule", "compound")
+REACHED = ("hull", "capsule", "cylinder", "compound")
 """Kinds of bodies whose gaps `lowest_reach` gives, since `gap_queries` does not know them."""
 
 
@@ -36,8 +36,10 @@ def lowest_reach(body: Any, quat: np.ndarray, dimensions: np.ndarray, normals: n
         return -support(body, -np.einsum("wi,kij->kwj", normals, R))
     if body.kind == "hull":
         return np.einsum("wi,kij,vj->kwv", normals, R, body.polyhedron.vertices).min(axis=-1)
-    radius, half = dimensions[:, :1], dimensions[:, 1:2] - dimensions[:, :1]
-    return -half * np.abs(R[:, :, 1] @ normals.T) - radius
+    radius, half, along = dimensions[:, :1], dimensions[:, 1:2], np.abs(R[:, :, 1] @ normals.T)
+    if body.kind == "cylinder":
+        return -half * along - radius * np.hypot(R[:, :, 0] @ normals.T, R[:, :, 2] @ normals.T)
+    return -(half - radius) * along - radius
 
 
 def wall_gaps(world: Batch, state: np.ndarray, params: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -324,8 +324,8 @@ class World(Touching, Querying):
             equal in each world, too.
         size : (3,), (k, 3) or (k, bodies, 3) array_like, optional
             Full edges of a block, twice the semi-axes of an ellipsoid, three equal diameters of a sphere; of a capsule
-            diameter, whole length and diameter [m]. The size of a hull or compound cannot change: only twice its
-            `dimensions` is accepted. Position and velocity stay, and so does the `center` of a block, in metres.
+            or cylinder diameter, whole length, diameter [m]. The size of a hull or compound cannot change: only twice
+            its `dimensions` is accepted. Position and velocity stay, and so does the `center` of a block, in metres.
         inertia_body : (3, 3), (k, 3, 3) or (k, bodies, 3, 3) array_like, optional
             Inertia tensor about the centre of mass, body frame [kg m²]. None: a change of mass or size sets the tensor
             of uniform density; if the scene's body has an `inertia_body`, or is a hull or compound, its tensor is

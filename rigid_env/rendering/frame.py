@@ -13,7 +13,7 @@ import numpy as np
 from rigid_env.rendering import palette
 from rigid_env.rendering.geometry import quaternion_product, rotation_matrices
 
-BODY_KINDS = ("block", "sphere", "ellipsoid", "hull", "capsule", "compound")
+BODY_KINDS = ("block", "sphere", "ellipsoid", "hull", "capsule", "cylinder", "compound")
 
 FACE_COUNT = 6
 """Faces of a block, in the order -x, +x, -y, +y, -z, +z of its body axes."""
@@ -34,11 +34,11 @@ class BodyView:
 
     Parameters
     ----------
-    kind : {"block", "sphere", "ellipsoid", "hull", "capsule", "compound"}
+    kind : {"block", "sphere", "ellipsoid", "hull", "capsule", "cylinder", "compound"}
         Kind of shape.
     dimensions : (3,) float
-        [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A capsule: half extents, its
-        axis along body y. A hull or compound: largest distances of its points from `pos`.
+        [m], along the body axes. A block: edges. A sphere or ellipsoid: semi-axes. A capsule or cylinder: half
+        extents, its axis along body y. A hull or compound: largest distances of its points from `pos`.
     pos : (3,) float
         Geometric centre of the shape; of a hull or compound its centre of mass. World frame [m].
     quat : (4,) float

@@ -1,4 +1,4 @@
-"""Convex meshes of bodies in the body frame: block, sphere, ellipsoid, capsule, hull."""
+"""Convex meshes of bodies in the body frame: block, sphere, ellipsoid, capsule, cylinder, hull."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
+
+CYLINDER_SIDES = 48
+"""Sides of the prism that stands for a cylinder: a multiple of 4, so that octants end at sides."""
 
 SPHERE_SUBDIVISIONS = 12
 """Subdivisions n of each edge of an octahedron's face, which becomes n² triangles; with 12 a sphere looks round."""
@@ -74,6 +77,8 @@ def body_mesh(body):
 def _body_mesh(kind, dimensions):
     if kind == "capsule":
         return capsule_mesh(dimensions)
+    if kind == "cylinder":
+        return cylinder_mesh(dimensions)
     return block_mesh(dimensions) if kind == "block" else ellipsoid_mesh(dimensions)
 
 
@@ -140,6 +145,25 @@ def capsule_mesh(dimensions, subdivisions=SPHERE_SUBDIVISIONS):
                 for high, low in ((0, middle), (middle, count)):
                     sides += [(b + high, a + high, a + low), (b + high, a + low, b + low)]
     return _used(np.concatenate([vertices + lift, vertices - lift, vertices]), np.concatenate([faces, sides]))
+
+
+def cylinder_mesh(dimensions):
+    """Mesh of a cylinder along body y with half extents `dimensions` (3,) [m]: a prism of `CYLINDER_SIDES` sides.
+
+    The sides are parted at y = 0, and the ends are fans about their middles, so that every triangle lies in one octant.
+    """
+    radius, half, n = dimensions[0], dimensions[1], CYLINDER_SIDES
+    angles = 2.0 * np.pi * np.arange(n) / n
+    ring = radius * np.stack([np.cos(angles), np.zeros(n), np.sin(angles)], axis=1)
+    rings = [ring + np.array([0.0, y, 0.0]) for y in (half, 0.0, -half)]
+    top, bottom, faces = 3 * n, 3 * n + 1, []
+    for k in range(n):
+        j = (k + 1) % n
+        faces += [(top, j, k), (bottom, 2 * n + k, 2 * n + j)]
+        for high, low in ((0, n), (n, 2 * n)):
+            faces += [(high + k, high + j, low + j), (high + k, low + j, low + k)]
+    middles = np.array([[0.0, half, 0.0], [0.0, -half, 0.0]])
+    return _mesh(np.concatenate([*rings, middles]), np.array(faces), is_smooth=True)
 
 
 def _used(vertices, faces):

@@ -54,7 +54,8 @@ def outlines(frame):
     """
     members = {"block": [], "round": [], "capsule": [], "hull": []}
     for index, body in enumerate(frame.bodies):
-        members[body.kind if body.kind in members else "round"].append(index)
+        kind = "hull" if body.kind == "cylinder" else body.kind
+        members[kind if kind in members else "round"].append(index)
     found = []
     closed_forms = ("block", _block_outlines), ("round", _round_outlines), ("capsule", _capsule_outlines)
     for kind, outlined in closed_forms:
@@ -100,7 +101,7 @@ def _capsule_outlines(pos, R, size):
 
 
 def _hull_outlines(body, R):
-    """Outlines of one hull: for each sample of the sun the convex hull of its corners, projected along the light."""
+    """Outlines of one hull or cylinder: for each sample of the sun the convex hull of its mesh, along the light."""
     corners = body.pos + body_mesh(body).vertices @ R.T
     loops = []
     for light in SUN_SAMPLES:

@@ -25,7 +25,7 @@ SUBDIVISIONS = (4, 6, 8, 10, 12)
 RIM_POINTS = 32
 """Number of points in the outline of a round body."""
 
-OWN_MESH = ("hull", "capsule")
+OWN_MESH = ("hull", "capsule", "cylinder")
 """Kinds of bodies whose meshes have their size; all others share meshes of unit size."""
 
 _ANGLES = 2.0 * np.pi * np.arange(RIM_POINTS)[:, None] / RIM_POINTS
@@ -96,7 +96,7 @@ def pose(canvas, frame, colours, rim_width, face_tint=None):
 
 
 def _meshes(canvas, bodies, depths):
-    """Yield the unit mesh of each body; a hull or capsule has a mesh of its own size."""
+    """Yield the unit mesh of each body; a hull, capsule or cylinder has a mesh of its own size."""
     focal = canvas.camera.focal(canvas.size[1]) / canvas.scale
     count = sum(body.kind in ("sphere", "ellipsoid") for body in bodies)
     facet = FACET * max(1.0, count / FEW) ** 0.5

@@ -294,7 +294,7 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
     """Check the draw `name`, a size or radius, against the shapes of the bodies that it means.
 
     A ValueError refuses a radius for a body that is no sphere, a radius beside a size for the same body, and a size
-    with three independent numbers for a sphere or a capsule.
+    with three independent numbers for a sphere, capsule or cylinder.
     """
     kind = (parameter_of(name) or ("",))[0]
     bodies, place = world.scene.bodies, place_of(name, world.scene)
@@ -314,5 +314,6 @@ def _check_spheres(task: str, distributions: Mapping[str, Distribution], world: 
         if is_sphere:
             allowed = f"'radius[{index}]' with a number, a pair or a distribution"
             raise ValueError(f"{told} is a Sphere, of one diameter; allowed is {allowed}")
-        if bodies[index].kind == "capsule":
-            raise ValueError(f"{told} is a Capsule, of two equal diameters; allowed is Choice([...]) of whole sizes")
+        if bodies[index].kind in ("capsule", "cylinder"):
+            shape = type(bodies[index]).__name__
+            raise ValueError(f"{told} is a {shape}, of two equal diameters; allowed is Choice([...]) of whole sizes")

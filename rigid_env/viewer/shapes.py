@@ -11,7 +11,15 @@ import numpy as np
 from rigid_env.rendering import BodyView
 from rigid_env.rendering.bodies import EDGE_LIGHTENING
 from rigid_env.rendering.geometry import rotation_matrix
-from rigid_env.rendering.meshes import BLOCK_FACES, Mesh, block_mesh, capsule_mesh, ellipsoid_mesh, hull_mesh
+from rigid_env.rendering.meshes import (
+    BLOCK_FACES,
+    Mesh,
+    block_mesh,
+    capsule_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+    hull_mesh,
+)
 from rigid_env.rendering.solids import OCTANT_LIGHTENING
 
 SUBDIVISIONS = 10
@@ -31,7 +39,8 @@ class Part:
     Parameters
     ----------
     vertices : (v, 3) float32
-        Corners, body frame: of a hull or capsule in [m], of other shapes to be multiplied by the body's dimensions.
+        Corners, body frame: of a hull, capsule or cylinder in [m], of other shapes to be multiplied by the body's
+        dimensions.
     faces : (f, 3) uint32
         Indices of each triangle's corners, counter-clockwise as seen from outside.
     lightening : float
@@ -53,8 +62,8 @@ def shape_key(body: BodyView):
     """Hashable key of a body's shape; bodies with equal keys have the same parts."""
     if body.kind == "hull":
         return body.corners.tobytes(), body.faces
-    if body.kind == "capsule":
-        return "capsule", tuple(body.dimensions.tolist())
+    if body.kind in ("capsule", "cylinder"):
+        return body.kind, tuple(body.dimensions.tolist())
     return "block" if body.kind == "block" else "round"
 
 
@@ -68,6 +77,8 @@ def parts(key) -> tuple[Part, ...]:
         return octants()
     if key[0] == "capsule":
         return octants(capsule_mesh(key[1], SUBDIVISIONS))
+    if key[0] == "cylinder":
+        return octants(cylinder_mesh(key[1]), is_flat=True)
     corners, polygons = np.frombuffer(key[0]).reshape(-1, 3), key[1]
     return solid(hull_mesh(tuple(map(tuple, corners.tolist())), polygons)), rim(corners, polygons)
 
@@ -77,10 +88,10 @@ def solid(mesh: Mesh) -> Part:
     return Part(mesh.vertices.astype(np.float32), _triangles(mesh.faces))
 
 
-def octants(mesh: Mesh | None = None) -> tuple[Part, Part]:
+def octants(mesh: Mesh | None = None, is_flat: bool = False) -> tuple[Part, Part]:
     """Octants of a round body in two parts: every second octant is lighter, which makes rotation visible.
 
-    Without a mesh the body is a sphere of radius 1.
+    Without a mesh the body is a sphere of radius 1. `is_flat` is that of the parts.
     """
     if mesh is None:
         mesh = ellipsoid_mesh((1.0, 1.0, 1.0), SUBDIVISIONS)
@@ -89,7 +100,7 @@ def octants(mesh: Mesh | None = None) -> tuple[Part, Part]:
         used, faces = np.unique(mesh.faces[mesh.is_odd_octant == is_odd], return_inverse=True)
         vertices = mesh.vertices[used].astype(np.float32)
         lightening = OCTANT_LIGHTENING if is_odd else 0.0
-        sides.append(Part(vertices, faces.reshape(-1, 3).astype(np.uint32), lightening, is_flat=False))
+        sides.append(Part(vertices, faces.reshape(-1, 3).astype(np.uint32), lightening, is_flat))
     return tuple(sides)
 
 
@@ -174,6 +185,8 @@ def _stay(body: BodyView, origin, direction):
         return _stay_in_ball(origin / body.dimensions, direction / body.dimensions)
     if body.kind == "capsule":
         return _stay_in_capsule(*body.dimensions[:2], origin, direction)
+    if body.kind == "cylinder":
+        return _stay_in_tube(*body.dimensions[:2], origin, direction)
     normals, offsets = _planes(body)
     speed, room = normals @ direction, offsets - normals @ origin
     if np.any(room[speed == 0.0] < 0.0):
@@ -197,16 +210,23 @@ def _stay_in_capsule(radius: float, reach: float, origin, direction):
     """First and last s in a capsule along y: in one of the balls about its ends, or in the cylinder between them."""
     half = np.array([0.0, reach - radius, 0.0])
     found = [_stay_in_ball((origin + end) / radius, direction / radius) for end in (half, -half)]
-    across = np.array([1.0, 0.0, 1.0]) / radius
-    tube = _stay_in_ball(origin * across, direction * across)
-    if tube is not None and direction[1] != 0.0:
-        sides = sorted((-origin[1] + end) / direction[1] for end in (half[1], -half[1]))
-        tube = max(tube[0], sides[0]), min(tube[1], sides[1])
-    elif abs(origin[1]) > half[1]:
-        tube = None
-    found.append(None if tube is None or tube[0] > tube[1] else tube)
+    found.append(_stay_in_tube(radius, half[1], origin, direction))
     spans = [span for span in found if span is not None]
     return (min(first for first, _ in spans), max(last for _, last in spans)) if spans else None
+
+
+def _stay_in_tube(radius: float, half: float, origin, direction):
+    """First and last s in a cylinder along y, from -half to half: across the axis a ball, along it a slab."""
+    across = np.array([1.0, 0.0, 1.0]) / radius
+    span = _stay_in_ball(origin * across, direction * across)
+    if span is None and not (direction * across).any() and (origin * across) @ (origin * across) <= 1.0:
+        span = -np.inf, np.inf
+    if span is not None and direction[1] != 0.0:
+        sides = sorted((-origin[1] + end) / direction[1] for end in (half, -half))
+        span = max(span[0], sides[0]), min(span[1], sides[1])
+    elif abs(origin[1]) > half:
+        return None
+    return None if span is None or span[0] > span[1] else span
 
 
 def _planes(body: BodyView):

@@ -204,6 +204,7 @@ MESHES = {
     "sphere": body_mesh(BodyView("sphere", (1.5, 1.5, 1.5), (0, 0, 0))),
     "ellipsoid": ellipsoid_mesh((2.5, 1.5, 1.0), subdivisions=5),
     "capsule": body_mesh(BodyView("capsule", (0.5, 1.75, 0.5), (0, 0, 0))),
+    "cylinder": body_mesh(BodyView("cylinder", (0.5, 0.2, 0.5), (0, 0, 0))),
 }
 WEDGE = physics.Hull([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)], 1.0, pos=(0, 2, 0))
 
@@ -316,6 +317,15 @@ def test_capsule_vertices_lie_on_the_capsule_and_no_triangle_crosses_an_octant()
     assert ((corners >= 0.0).all(axis=1) | (corners <= 0.0).all(axis=1)).all()
 
 
+def test_cylinder_vertices_lie_on_the_cylinder_and_no_triangle_crosses_an_octant():
+    mesh = MESHES["cylinder"]
+    ring = mesh.vertices[:-2]
+    np.testing.assert_allclose(np.hypot(ring[:, 0], ring[:, 2]), 0.5, rtol=ROUNDING)
+    assert set(mesh.vertices[:, 1].tolist()) == {-0.2, 0.0, 0.2}
+    corners = np.where(abs(mesh.vertices) < ROUNDING, 0.0, mesh.vertices)[mesh.faces]
+    assert ((corners >= 0.0).all(axis=1) | (corners <= 0.0).all(axis=1)).all()
+
+
 @given(
     quat=arrays(float, 4, elements=st.floats(-1.0, 1.0)).filter(lambda q: q @ q > 0.1),
     axes=st.tuples(*[st.floats(0.3, 3.0)] * 3),
@@ -417,7 +427,7 @@ HALF_TURN = (0.0, 0.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("quat", [(1.0, 0.0, 0.0, 0.0), HALF_TURN], ids=["as it is", "half a turn"])
-@pytest.mark.parametrize("kind", ["block", "sphere", "ellipsoid", "capsule"])
+@pytest.mark.parametrize("kind", ["block", "sphere", "ellipsoid", "capsule", "cylinder"])
 def test_middle_of_the_body_has_the_colour_of_the_lit_face_in_front(renderer, kind, quat):
     body = BodyView(kind, (4, 4, 4), (1, 5, 0), quat, colour=(200, 60, 40))
     frame = Frame((body,), THREE_WALLS)

@@ -19,6 +19,7 @@ SEEN = {
     "physics/scene/bodies.py Ellipsoid.__init__": "for editors: the dataclass makes another one",
     "physics/scene/capsule.py Capsule.__init__": "for editors: the dataclass makes another one",
     "physics/scene/compound.py Compound.__init__": "for editors: the dataclass makes another one",
+    "physics/scene/cylinder.py Cylinder.__init__": "for editors: the dataclass makes another one",
     "physics/scene/bodies.py Hull.__init__": "for editors: the dataclass makes another one",
     "physics/scene/bodies.py Sphere.__init__": "for editors: the dataclass makes another one",
     "physics/world/world.py World.set_parameters": "for users: all parameters by name",

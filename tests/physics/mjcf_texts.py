@@ -14,6 +14,7 @@ def floor(attributes: str = "") -> str:
 
 
 TETRA = '<mesh name="m" vertex="0 0 0  .3 0 0  0 .4 0  0 0 .5"/>'
+HILLS = '<hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/>'
 STRETCHED = TETRA.replace("/>", ' scale="1 2 3"/>')
 START = '<key qpos="1 2 3 .5 -.5 .5 .5" qvel="1 2 3 4 5 6"/>'
 
@@ -131,6 +132,8 @@ READ = {
     "plane of a fixed body": model(
         box(), world='<body euler="30 0 0" pos="0 0 -1">' + floor('zaxis="1 0 2"') + "</body>"
     ),
+    "cylinder": model('<geom type="cylinder" size=".1 .2" pos="0 0 0" euler="0 30 0"/>', world=floor()),
+    "fixed cylinder": model(box(), world=floor() + '<geom type="cylinder" size=".1 .2" euler="90 0 20"/>'),
     "seen only": model(
         box() + '<geom type="capsule" size=".1 .2" mass="0" contype="0" conaffinity="0"/>',
         world=floor() + '<geom type="cylinder" size=".1 .2" contype="0" conaffinity="0"/>',
@@ -161,9 +164,9 @@ READ = {
 
 HINGE = '<body><joint name="knee"/><geom size=".1" mass="1"/></body>'
 REFUSED = {
-    "fixed rod": (
-        model(box(), world='<geom name="t" type="cylinder" size="1 1"/>'),
-        "line 4: <geom 't'> is a fixed cylinder",
+    "fixed hills": (
+        model(box(), world='<geom name="t" type="hfield" hfield="h"/>', before=f"<asset>{HILLS}</asset>"),
+        "line 4: <geom 't'> is a fixed hfield",
     ),
     "two geoms": (
         model(box() + box('name="b" friction=".3"')),
@@ -174,10 +177,6 @@ REFUSED = {
         "<body> in a scene: the centre of mass of its 2 geoms is [0.25, 0.0, 0.0] m from that of the body",
     ),
     "no geom": (of("", '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'), "<body> has 0 geoms"),
-    "cylinder": (
-        model('<geom type="cylinder" size=".1 .2"/>'),
-        "<geom> of <body> is a cylinder; allowed of a free body",
-    ),
     "hinge": (model(box(), world=HINGE), "line 4: <joint 'knee'> is a hinge"),
     "leg": (model(box() + HINGE), "line 5: <joint 'knee'> is a hinge"),
     "tendon": (

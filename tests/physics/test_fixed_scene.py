@@ -65,7 +65,7 @@ BAD = [
     ),
     (
         lambda: physics.World(with_effect(physics.RollingFriction())),
-        "RollingFriction.*without hulls, capsules, compounds, fixed bodies",
+        "RollingFriction.*without hulls, capsules, cylinders, compounds, fixed bodies",
     ),
 ]
 

@@ -64,6 +64,7 @@ def every_public_object():
     yield from (physics.Block((1, 2, 3), 1), physics.Sphere(0.5, 2, name="a<b"), physics.Ellipsoid((1, 2, 3), 4))
     yield physics.Capsule(0.5, 2.0, 3)
     yield physics.Sensor(physics.Sphere(0.5, fixed=True, pos=(1, 2, 3)), 4, name="goal")
+    yield physics.Cylinder(0.5, 2.0, 3)
     yield physics.Compound([physics.Sphere(0.5, 2)])
     yield physics.HalfSpace((0, 1, 0), -2)
     yield physics.Event(0.5, "impact", 0, 1, (0.0, 3.25, 0.0))

@@ -14,7 +14,7 @@ from physics.io.mjcf.model import compile_model
 from physics.io.mjcf.text import parse
 
 mujoco = pytest.importorskip("mujoco", minversion="3.3.7")
-from tests.physics.mjcf_texts import READ, REFUSED, box, floor, model  # noqa: E402 - after the skip
+from tests.physics.mjcf_texts import HILLS, READ, REFUSED, box, floor, model  # noqa: E402 - after the skip
 from tests.reference import mujoco_model  # noqa: E402 - it imports mujoco
 
 CASES = Path(__file__).parents[3] / "shared" / "cases" / "mjcf"
@@ -85,8 +85,8 @@ def test_what_a_scene_cannot_hold_is_named_with_its_line(name):
 def test_the_rest_is_read_and_what_was_left_out_is_listed():
     text = model(
         box('name="a" friction=".5"'), box() + box('friction=".3"'), box('name="c"'),
-        world='<geom name="t" type="cylinder" size="1 1"/>' + floor('name="f" friction=".5"'),
-        before='<option density="1.2"/>',
+        world='<geom name="t" type="hfield" hfield="h"/>' + floor('name="f" friction=".5"'),
+        before=f'<option density="1.2"/><asset>{HILLS}</asset>',
     )  # fmt: skip
     scene, left = read_mjcf(text, "here", drop=True)
     assert [body.pos for body in scene.bodies] == [(0, 0, 2), (2, 0, 2)]
@@ -96,7 +96,7 @@ def test_the_rest_is_read_and_what_was_left_out_is_listed():
     told = [
         "line 2: <option> has a medium",
         "line 6: <geom> of <body> differs",
-        "line 4: <geom 't'> is a fixed cylinder",
+        "line 4: <geom 't'> is a fixed hfield",
     ]
     assert [message.startswith(start) for message, start in zip(left, told)] == [True] * 3
     assert len(left) == 3
@@ -136,11 +136,12 @@ def test_included_files_and_meshes_stand_beside_the_model(tmp_path):
 
 def test_an_element_of_an_included_file_is_named_without_a_line(tmp_path):
     (tmp_path / "table.xml").write_text(
-        '<mujoco><worldbody><geom name="t" type="cylinder" size="1 1"/></worldbody></mujoco>', encoding="utf-8"
+        f'<mujoco><asset>{HILLS}</asset><worldbody><geom name="t" type="hfield" hfield="h"/></worldbody></mujoco>',
+        encoding="utf-8",
     )
     path = tmp_path / "model.xml"
     path.write_text(model(box(), before='<include file="table.xml"/>'), encoding="utf-8")
-    with pytest.raises(ValueError, match=r"model\.xml: <geom 't'> is a fixed cylinder"):
+    with pytest.raises(ValueError, match=r"model\.xml: <geom 't'> is a fixed hfield"):
         physics.load_mjcf(path)
 
 

@@ -150,6 +150,8 @@ def _part_off(model, data, geom: int, body, here: np.ndarray, R: np.ndarray) -> 
     size = np.full(3, size[0]) if body.kind == "sphere" else size
     if body.kind == "capsule":  # radius and half the axis, which is along z there
         size = np.array([size[0], size[0], size[0] + size[1]])
+    if body.kind == "cylinder":
+        size = np.array([size[0], size[0], size[1]])
     spread, its = R @ np.diag(body.dimensions**2) @ R.T, axes @ np.diag(size**2) @ axes.T
     return max(_off(here, there, scale), _off(spread, its, float(np.max(size) ** 2)))
 

@@ -260,6 +260,15 @@ def test_sizes_of_a_capsule_are_whole_sizes():
         type("Rod", (Rod,), {"draws": {"radius": (0.2, 0.4)}})()
 
 
+def test_sizes_of_a_cylinder_are_whole_sizes():
+    class Coin(Free):
+        scene = physics.Scene([physics.Cylinder(0.5, 0.1, 3.0)])
+        draws = {"size": ((1.0, 2.0, 1.0), (1.2, 3.0, 1.2)), "goal": (-1.0, 1.0)}  # noqa: RUF012
+
+    with pytest.raises(ValueError, match="body 0 is a Cylinder, of two equal diameters; allowed is Choice"):
+        Coin()
+
+
 def test_memory_starts_at_zero_and_is_kept_from_step_to_step():
     class Counting(Slide):
         memory = {"count": 1, "last": 3}  # noqa: RUF012

@@ -8,7 +8,7 @@ import inspect
 
 import pytest
 
-MODULES = ("bodies", "capsule", "compound", "effects", "force_fields", "springs", "scene")
+MODULES = ("bodies", "capsule", "compound", "cylinder", "effects", "force_fields", "springs", "scene")
 
 
 def declared(module) -> dict[str, list[str]]:

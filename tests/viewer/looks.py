@@ -44,9 +44,9 @@ def crowd(count: int, rng: np.random.Generator) -> tuple[BodyView, ...]:
     for k in range(count):
         pos, quat = np.add(rng.uniform(-4.0, 4.0, 3), (0.0, 5.0, 0.0)), rng.standard_normal(4)
         quat = quat / np.linalg.norm(quat)
-        kind = ("block", "sphere", "ellipsoid", "hull", "capsule")[k % 5]
+        kind = ("block", "sphere", "ellipsoid", "hull", "capsule", "cylinder")[k % 6]
         size = np.full(3, 0.6) if kind in ("sphere", "hull") else rng.uniform(0.4, 1.2, 3)
-        size = np.array([0.4, 1.0, 0.4]) if kind == "capsule" else size
+        size = np.array([0.4, 1.0, 0.4]) if kind in ("capsule", "cylinder") else size
         hull = {"corners": CUBE_CORNERS, "faces": tuple(map(tuple, BLOCK_FACES.tolist()))} if kind == "hull" else {}
         bodies.append(BodyView(kind, size, pos, quat, **hull))
     return tuple(bodies)

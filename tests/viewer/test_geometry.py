@@ -28,7 +28,7 @@ points = arrays(float, 3, elements=numbers)
 
 
 def one_body(seed: int, kind: int):
-    return crowd(5, np.random.default_rng(seed))[kind]
+    return crowd(6, np.random.default_rng(seed))[kind]
 
 
 def depth(body, point) -> float:
@@ -39,6 +39,8 @@ def depth(body, point) -> float:
     if body.kind == "capsule":
         radius, half = body.dimensions[0], body.dimensions[1] - body.dimensions[0]
         return float(np.linalg.norm(local - (0.0, np.clip(local[1], -half, half), 0.0))) - radius
+    if body.kind == "cylinder":
+        return max(float(np.hypot(local[0], local[2])) - body.dimensions[0], abs(local[1]) - body.dimensions[1])
     mesh = body_mesh(body)
     return float((np.sum(mesh.normals * (local - mesh.vertices[mesh.faces[:, 0]]), axis=1)).max())
 
@@ -46,9 +48,9 @@ def depth(body, point) -> float:
 def compound(seed: int) -> BodyView:
     """Two of the shapes of `crowd` beside each other, and a body that holds both."""
     rng = np.random.default_rng(seed)
-    one, other = rng.choice(5, 2)
+    one, other = rng.choice(6, 2)
     parts = [
-        replace(body, pos=(x, 0.0, 0.0)) for body, x in zip(np.array(crowd(5, rng), object)[[one, other]], (-2, 2))
+        replace(body, pos=(x, 0.0, 0.0)) for body, x in zip(np.array(crowd(6, rng), object)[[one, other]], (-2, 2))
     ]
     return BodyView("compound", (4.0, 2.0, 2.0), (1.0, 2.0, 3.0), (0.6, 0.0, 0.8, 0.0), parts=parts)
 
@@ -105,7 +107,7 @@ def test_points_go_to_a_body_and_back(seed, point):
 
 @given(seeds, points)
 def test_points_are_drawn_and_found_again(seed, point):
-    placement = place(look_of(crowd(5, np.random.default_rng(seed))))
+    placement = place(look_of(crowd(6, np.random.default_rng(seed))))
     np.testing.assert_allclose(placement.world(placement.drawn(point)), point, atol=1e-4)
 
 
@@ -175,11 +177,12 @@ def test_a_rim_lies_on_its_body_and_all_faces_look_outwards(kind):
 
 
 def test_bodies_of_one_shape_have_one_key():
-    bodies = crowd(10, np.random.default_rng(0))
-    assert shape_key(bodies[0]) == shape_key(bodies[5])
+    bodies = crowd(12, np.random.default_rng(0))
+    assert shape_key(bodies[0]) == shape_key(bodies[6])
     assert shape_key(bodies[1]) == shape_key(bodies[2])
-    assert shape_key(bodies[3]) == shape_key(bodies[8])
-    assert shape_key(bodies[4]) == shape_key(bodies[9])
+    assert shape_key(bodies[3]) == shape_key(bodies[9])
+    assert shape_key(bodies[4]) == shape_key(bodies[10])
+    assert shape_key(bodies[5]) == shape_key(bodies[11]) != shape_key(bodies[4])
     assert shape_key(bodies[4]) != shape_key(replace(bodies[4], dimensions=(0.4, 2.0, 0.4)))
     assert shape_key(bodies[3]) != shape_key(replace(bodies[3], corners=2.0 * bodies[3].corners))
 

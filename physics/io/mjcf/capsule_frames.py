@@ -1,4 +1,4 @@
-"""Frames of capsules: MuJoCo's axis is that of z of the geom, ours is that of y of the body."""
+"""Frames of capsules and cylinders: MuJoCo's axis is that of z of the geom, ours is that of y of the body."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import numpy as np
 
 from physics.rotations import product
 
-# Frame of a scene's capsule in that of the geom, whose z axis is its y axis; then the frame of the geom in it.
+# Kinds of geoms with an axis.
+WITH_AXIS = ("capsule", "cylinder")
+
+# Frame of a scene's capsule or cylinder in that of the geom, whose z axis is its y axis; then that of the geom in it.
 IN_GEOM = np.array([0.5**0.5, 0.5**0.5, 0.0, 0.0])
 OF_GEOM = np.array([0.5**0.5, -(0.5**0.5), 0.0, 0.0])
 
@@ -15,13 +18,16 @@ ROUNDED = 1e-12
 
 
 def capsule_frame(quat: np.ndarray) -> np.ndarray:
-    """Quaternion (4,) of a scene's capsule whose geom has the quaternion `quat` (4,); the identity up to rounding."""
+    """Quaternion (4,) of a scene's capsule or cylinder whose geom has the quaternion `quat` (4,).
+
+    It is the identity up to rounding.
+    """
     turned = product(quat, IN_GEOM)
     if np.abs(turned[1:]).max() <= ROUNDED:
         return np.array([1.0, 0.0, 0.0, 0.0])
     return turned
 
 
-def capsule_extents(size: np.ndarray) -> np.ndarray:
-    """Half extents (3,) [m] of a scene's capsule from MuJoCo's radius and half-length of the cylinder."""
-    return np.array([size[0], size[1] + size[0], size[0]])
+def axis_extents(kind: str, size: np.ndarray) -> np.ndarray:
+    """Half extents (3,) [m] of a scene's capsule or cylinder from MuJoCo's radius and half-length of the cylinder."""
+    return np.array([size[0], size[1] + size[0] * (kind == "capsule"), size[0]])

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
+from physics.io.mjcf.capsule_frames import WITH_AXIS, axis_extents, capsule_frame
 from physics.io.mjcf.compounds import DENSITY, PlacedGeom, make_compound, make_fixed_compound
 from physics.io.mjcf.left_out import LeftOut
 from physics.io.mjcf.model import ORIGIN, Model, Pose
@@ -20,7 +20,7 @@ from physics.mass.inertia import MassProperties, compose
 from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
 
-SHAPES = ("box", "sphere", "ellipsoid", "capsule", "mesh")
+SHAPES = ("box", "sphere", "ellipsoid", "capsule", "cylinder", "mesh")
 TURNED = ("box", "ellipsoid")  # shapes whose axes become the body axes in a scene
 
 # MuJoCo finds principal axes by an iteration, older versions to 2e-7. If its tensor agrees with that of the file to
@@ -119,7 +119,7 @@ def _fixed_geoms(model: Model, geoms: list[int], left: LeftOut) -> list[FixedEle
             shape = (_points(model, geom) - frame.pos) @ frame.R
         else:
             shape = _half_axes(kind, m.geom_size[geom])
-        pose = np.concatenate((frame.pos, capsule_frame(frame.quat) if kind == "capsule" else frame.quat))
+        pose = np.concatenate((frame.pos, capsule_frame(frame.quat) if kind in WITH_AXIS else frame.quat))
         try:
             body = make_fixed(kind, shape, pose, None if name in ("", unnamed(root - 1)) else name)
             found.append(FixedElement(root, geom, [geom], body))
@@ -165,7 +165,7 @@ def _free_body(model: Model, touching: Touching, root: int, number: int) -> Body
             raise model.error("body", root, f"in a scene: {error}") from None
         return BodyElements(body, root, joint, geom, geoms, not mass.centre.any())
     axes = frame.quat if kind in TURNED else np.array([1.0, 0.0, 0.0, 0.0])
-    if kind == "capsule":
+    if kind in WITH_AXIS:
         axes = capsule_frame(frame.quat)
     T = rotation_matrices(axes).T  # from the axes of the model's body to those of the scene's
     if kind == "mesh":
@@ -191,7 +191,7 @@ def _placed_geom(model: Model, geom: int, inner: Pose = ORIGIN) -> PlacedGeom:
     """
     m, frame, spec = model.data, inner @ model.geom_frames[geom], model.spec("geom", geom)
     kind, pos = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom]), frame.pos
-    quat = capsule_frame(frame.quat) if kind == "capsule" else frame.quat
+    quat = capsule_frame(frame.quat) if kind in WITH_AXIS else frame.quat
     if kind == "mesh":
         shape, pos, quat = _points(model, geom), inner.pos, inner.quat
     else:
@@ -257,8 +257,8 @@ def _tensor(model: Model, b: int) -> np.ndarray:
 
 def _half_axes(kind: str, size: np.ndarray) -> np.ndarray:
     """Dimensions (3,) [m] of a geom of MuJoCo's `size`: half edges, semi-axes, half extents, or thrice the radius."""
-    if kind == "capsule":
-        return capsule_extents(size)
+    if kind in WITH_AXIS:
+        return axis_extents(kind, size)
     return np.full(3, size[0]) if kind == "sphere" else np.array(size)
 
 

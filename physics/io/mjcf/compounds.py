@@ -31,7 +31,7 @@ class PlacedGeom(NamedTuple):
     pos : (3,) float64
         Place of the geom [m].
     quat : (4,) float64
-        Unit quaternion of its axes; the axis of a capsule is its y axis.
+        Unit quaternion of its axes; the axis of a capsule or cylinder is its y axis.
     mass : float
         Mass [kg]; of a fixed body it is not used.
     """

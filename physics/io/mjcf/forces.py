@@ -83,14 +83,15 @@ def damping(model: Model, free: list[BodyElements], left: LeftOut) -> list[Any]:
     first = next(iter(found.values()))
     is_same = all(np.array_equal(each, first) for each in found.values())
     are_centred = all(each.is_centred and not any(each.body.center) for each in free)
-    are_centred = are_centred and all(each.body.kind not in ("hull", "capsule", "compound") for each in free)
+    without_axes = "hull", "capsule", "cylinder", "compound"
+    are_centred = are_centred and all(each.body.kind not in without_axes for each in free)
     if is_same and are_centred and not first[1:].any():
         return [Drag(0.0, linear=first[0]), AngularDrag(first[0])]
     for joint, value in found.items():
         if value.any():
             allowed = (
                 "allowed is one number for all bodies, whose joints are at their centres of mass, without meshes, "
-                "capsules and bodies of several geoms"
+                "capsules, cylinders and bodies of several geoms"
             )
             left.add(model.error("joint", joint, f"has damping {m.dof_damping[m.jnt_dofadr[joint]]:g}; {allowed}"))
     return []

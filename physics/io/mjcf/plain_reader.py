@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from physics import validation
-from physics.io.mjcf.capsule_frames import capsule_extents, capsule_frame
+from physics.io.mjcf.capsule_frames import WITH_AXIS, axis_extents, capsule_frame
 from physics.io.mjcf.compounds import DENSITY, PlacedGeom, make_compound, make_fixed_compound
 from physics.io.mjcf.contacts import LEAST_FRICTION, Surface, dynamic_friction, find_contact, touched
 from physics.io.mjcf.left_out import LeftOut
@@ -28,7 +28,7 @@ from physics.scene.scene import HalfSpace, Scene
 DEFAULT_GRAVITY = "0 0 -9.81"  # MuJoCo's default [m/s²]
 DEFAULT_FRICTION = "1 0.005 0.0001"  # MuJoCo's defaults for sliding, torsion and rolling
 
-SHAPES = ("box", "sphere", "ellipsoid", "capsule", "mesh")
+SHAPES = ("box", "sphere", "ellipsoid", "capsule", "cylinder", "mesh")
 
 # For each element that is read: its attributes, and the elements within it.
 ELEMENTS: dict[str, tuple[str, str]] = {
@@ -299,7 +299,7 @@ def _fixed_body(b: int, element: Element, meshes: dict) -> Body:
     geom, kind, shape = _only_geom(element, meshes)
     arm = _numbers(geom, "pos", 3, "0 0 0")
     pose[:3] += rotation_matrices(pose[3:]) @ arm
-    if kind == "capsule":
+    if kind in WITH_AXIS:
         pose[3:] = product(pose[3:], capsule_frame(_unit(geom)))
     try:
         return make_fixed(kind, shape, pose, name)
@@ -322,7 +322,7 @@ def _placed_geoms(element: Element, meshes: dict) -> list[PlacedGeom]:
             raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
         _refuse(geom, "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
         shape, quat = _points(geom, meshes) if kind == "mesh" else _half_axes(geom), _unit(geom)
-        turn = capsule_frame(quat) if kind == "capsule" else quat
+        turn = capsule_frame(quat) if kind in WITH_AXIS else quat
         mass = 0.0
         if kind == "mesh" and geom.get("mass") is not None:
             mass = float(_numbers(geom, "mass", 1)[0])
@@ -341,7 +341,7 @@ def _only_geom(element: Element, meshes: dict) -> tuple[Element, str, np.ndarray
     if kind not in SHAPES:
         raise _unread(geom, f"is a {kind}; allowed are {', '.join(SHAPES)}")
     _refuse(geom, "zaxis", *(("size", "density") if kind == "mesh" else ("mesh",)))
-    if kind != "capsule":
+    if kind not in WITH_AXIS:
         _refuse(geom, "quat")
     return geom, kind, _points(geom, meshes) if kind == "mesh" else _half_axes(geom)
 
@@ -363,7 +363,7 @@ def _body(b: int, element: Element, meshes: dict, pose: np.ndarray, velocity: np
             raise _error(element, f"in a scene: {error}") from None
     geom, kind, shape = _only_geom(element, meshes)
     placed = Placed(kind, shape, _numbers(geom, "pos", 3, "0 0 0"), _mass_properties(element, geom, shape))
-    if kind == "capsule":
+    if kind in WITH_AXIS:
         axes = capsule_frame(_unit(geom))
         T = rotation_matrices(axes).T  # from the axes of the element to those of the scene's body
         placed = placed._replace(pos=T @ placed.pos, mass=placed.mass.placed(R=T))
@@ -387,8 +387,8 @@ def _points(geom: Element, meshes: dict) -> np.ndarray:
 
 def _half_axes(geom: Element) -> np.ndarray:
     """Dimensions (3,) [m] of a geom: half edges, semi-axes, half extents, or three times the radius."""
-    if _type(geom) == "capsule":
-        return capsule_extents(_numbers(geom, "size", 2))
+    if _type(geom) in WITH_AXIS:
+        return axis_extents(_type(geom), _numbers(geom, "size", 2))
     return np.resize(_numbers(geom, "size", 1 if _type(geom) == "sphere" else 3), 3)
 
 
@@ -434,7 +434,7 @@ def _of_geom(geom: Element, shape: np.ndarray) -> MassProperties:
     kind = _type(geom)
     mass = _mass_of(geom, kind, shape)
     inertia = np.diag(uniform_moments(kind, shape, mass))
-    if kind == "capsule":
+    if kind in WITH_AXIS:
         inertia = rotate(inertia, rotation_matrices(capsule_frame(_unit(geom))))
     return MassProperties(mass, _numbers(geom, "pos", 3, "0 0 0"), inertia)
 
@@ -445,7 +445,9 @@ def _mass_of(geom: Element, kind: str, shape: np.ndarray) -> float:
         mass = float(_numbers(geom, "mass", 1)[0])
     else:
         volume = float(np.prod(shape)) * (8.0 if kind == "box" else 4 * np.pi / 3)
-        if kind == "capsule":
+        if kind == "cylinder":
+            volume = float(2 * np.pi * shape[0] ** 2 * shape[1])
+        elif kind == "capsule":
             volume = float(np.pi * shape[0] ** 2 * (2 * (shape[1] - shape[0]) + 4 / 3 * shape[0]))
         mass = volume * float(_numbers(geom, "density", 1, str(DENSITY))[0])
     if not mass > 0:

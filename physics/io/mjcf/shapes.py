@@ -8,11 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from physics.mass.inertia import MassProperties, block_moments, capsule_moments, ellipsoid_moments
+from physics.mass.inertia import MassProperties, block_moments, capsule_moments, cylinder_moments, ellipsoid_moments
 from physics.mass.polyhedron import convex_hull
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere
 from physics.scene.capsule import Capsule
+from physics.scene.cylinder import Cylinder
 
 # Share to which an inertia counts as that of uniform density, and a geom as at the centre of mass: the rounding errors
 # of a text, and of rotations there and back.
@@ -27,11 +28,11 @@ class Placed(NamedTuple):
     Attributes
     ----------
     kind : str
-        Kind of the geom: "box", "sphere", "ellipsoid", "capsule" or "mesh".
+        Kind of the geom: "box", "sphere", "ellipsoid", "capsule", "cylinder" or "mesh".
     shape : (3,) or (n, 3) float64
         Half edges, semi-axes, half extents, or three times the radius [m]. Of a mesh its points relative to `pos` [m].
     pos : (3,) float64
-        Centre of the geom [m]. Its axes are those of the body; the axis of a capsule is body y.
+        Centre of the geom [m]. Its axes are those of the body; the axis of a capsule or cylinder is body y.
     mass : MassProperties
         Mass, centre of mass and inertia of the body.
     """
@@ -104,6 +105,8 @@ def make_part(kind: str, shape: np.ndarray, pos: np.ndarray, quat: np.ndarray, g
         return Block(tuple(2 * shape), **start)
     if kind == "capsule":
         return Capsule(float(shape[0]), 2 * float(shape[1] - shape[0]), **start)
+    if kind == "cylinder":
+        return Cylinder(float(shape[0]), 2 * float(shape[1]), **start)
     return Sphere(float(shape[0]), **start) if kind == "sphere" else Ellipsoid(tuple(shape), **start)
 
 
@@ -111,6 +114,8 @@ def uniform_moments(kind: str, shape: np.ndarray, mass: float) -> np.ndarray:
     """Principal moments (3,) [kg m²] of a geom other than a mesh, of uniform density."""
     if kind == "box":
         return block_moments(2 * shape, mass)
+    if kind == "cylinder":
+        return cylinder_moments(shape, mass)
     return capsule_moments(shape, mass) if kind == "capsule" else ellipsoid_moments(shape, mass)
 
 
@@ -130,6 +135,8 @@ def _convex(placed: Placed, start: dict[str, Any]) -> Body:
         return Sphere(float(half[0]), mass, **start)
     if placed.kind == "capsule":
         return Capsule(float(half[0]), 2 * float(half[1] - half[0]), mass, **start)
+    if placed.kind == "cylinder":
+        return Cylinder(float(half[0]), 2 * float(half[1]), mass, **start)
     return Ellipsoid(tuple(half), mass, **start)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from physics.io.mjcf.capsule_frames import OF_GEOM
+from physics.io.mjcf.capsule_frames import OF_GEOM, WITH_AXIS
 from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import product as quaternion_product
 from physics.rotations import rotation_matrices
@@ -25,7 +25,10 @@ from physics.scene.force_fields import Spring
 from physics.scene.groups import assign_groups, touching_pairs
 from physics.scene.scene import Scene
 
-GEOMS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule"}
+GEOMS = {
+    "block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule",
+    "cylinder": "cylinder",
+}  # fmt: skip
 KEYFRAME = "start"
 MOST_BITS = 2**30  # MuJoCo's masks are integers of 32 bits with a sign
 
@@ -231,8 +234,9 @@ def _shape(body, mesh: str, pos: np.ndarray, quat: np.ndarray | None = None) -> 
     """
     size = body.dimensions[:1] if body.kind == "sphere" else body.dimensions
     extent = {"mesh": mesh} if body.kind == "hull" else {"size": _text(size)}
-    if body.kind == "capsule":
-        extent = {"size": _text((body.radius, 0.5 * body.length))}
+    if body.kind in WITH_AXIS:
+        length = body.length if body.kind == "capsule" else body.height
+        extent = {"size": _text((body.radius, 0.5 * length))}
         quat = OF_GEOM if quat is None else quaternion_product(quat, OF_GEOM)
     turn = {} if quat is None else {"quat": _text(quat)}
     return {"type": GEOMS[body.kind], **extent, **turn, "pos": _text(pos)}

@@ -39,7 +39,7 @@ def write_angular_momenta(rows, state, params):
 
 @entry_kernel
 def deepest_gaps(rows, state, params, shapes, walls, gaps, which):
-    """Find the smallest gap of each given row over all walls; hulls and capsules are not supported.
+    """Find the smallest gap of each given row over all walls; hulls, capsules and cylinders are not supported.
 
     Written are `gaps` (len(rows),) [m] and `which` (len(rows),), the index of the wall, or -1 without walls.
     """

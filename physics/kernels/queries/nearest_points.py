@@ -14,6 +14,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, row_matrix
+from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.hull_tables import FIRST_EDGE, FIRST_FACE, LAST_EDGE, LAST_FACE
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import (
     center_direction,
@@ -27,6 +28,7 @@ from physics.kernels.multibody.narrowphase.gjk import support_point
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import direction_from_edge, hull_separation, nearest_on_hull
 from physics.kernels.multibody.narrowphase.hull_pose import is_above_face, pose_hull
 from physics.kernels.queries.nearest_of_capsules import nearest_of_capsule, nearest_on_capsule
+from physics.kernels.queries.nearest_of_cylinders import nearest_on_cylinder
 from physics.kernels.queries.polyhedra_distance import nearest_of_polyhedra
 from physics.kernels.state.layout import BLOCK, ELLIPSOID, HULL, SPHERE, WALL_NORMAL, WALL_OFFSET
 
@@ -48,6 +50,8 @@ def nearest_on_body(b, x, scratch):
     arm, shape = minus(x, center), scratch.bodies.body[b].shape
     if is_capsule(b, scratch):
         return nearest_on_capsule(b, x, scratch)
+    if is_cylinder(b, scratch):
+        return nearest_on_cylinder(b, x, scratch)
     if shape == SPHERE:
         n = center_direction(arm)
         return math.sqrt(qt.dot(arm, arm)) - dims[0], n, add_scaled(center, dims[0], n)

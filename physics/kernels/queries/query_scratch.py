@@ -39,7 +39,15 @@ class PosedBodies(NamedTuple):
     center: np.ndarray  # (bodies, 3) geometric centre, world frame [m]
     rotation: np.ndarray  # (bodies, 9) rotation matrix from body frame to world frame, row by row
     capsules: bool | None  # None if neither a body nor the shape is a capsule
+    cylinders: bool | None  # None if neither a body nor the shape is a cylinder
     parts: Parts | None  # None without compounds
+
+
+class RoundKinds(NamedTuple):
+    """Kinds of round bodies that have kernels of their own; None for kinds that are not there."""
+
+    capsules: bool | None
+    cylinders: bool | None
 
 
 class PairScratch(NamedTuple):
@@ -71,7 +79,7 @@ class QueriedBodies(NamedTuple):
 
 
 def make_query_scratch(
-    bodies: int, walls: np.ndarray, polyhedra: Sequence, capsules: bool | None, parts: Sequence[Part] = ()
+    bodies: int, walls: np.ndarray, polyhedra: Sequence, kinds: RoundKinds, parts: Sequence[Part] = ()
 ) -> QueryScratch:
     """Allocate the scratch memory of one thread.
 
@@ -84,8 +92,8 @@ def make_query_scratch(
     polyhedra : sequence
         Polyhedron of each body and part as `hull_tables.make_hulls` takes them, of blocks, too; None for a round body.
         The last one is that of a shape that is no body of the world.
-    capsules : True or None
-        Whether some of these bodies and shapes are capsules.
+    kinds : RoundKinds
+        Which of these kinds are among these bodies and shapes.
     parts : sequence of Part
         Parts of the compounds, sorted by their bodies.
     """
@@ -94,7 +102,7 @@ def make_query_scratch(
     hulls = make_hulls(polyhedra)
     write_part_records(records, bodies, parts)
     return QueryScratch(
-        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9)), capsules, make_parts(bodies, parts)),
+        PosedBodies(records, np.zeros((rows, 3)), np.zeros((rows, 9)), *kinds, make_parts(bodies, parts)),
         PairScratch(*(np.zeros((4, 3)) for _ in range(4)), hulls, _face_offsets(hulls)),
         make_box_tree(bodies + len(parts)),
         walls.copy(),
@@ -118,6 +126,8 @@ def bounding_radius(shape, dims, hull_radius):
         return math.sqrt(dims[0] * dims[0] + dims[1] * dims[1] + dims[2] * dims[2])
     if shape == at.HULL:
         return hull_radius
+    if shape == at.CYLINDER:
+        return math.sqrt(dims[0] * dims[0] + dims[1] * dims[1])
     return max(dims[0], dims[1], dims[2])
 
 

@@ -12,6 +12,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
+from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.hull_tables import FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.data.parts import body_of, is_compound
 from physics.kernels.parallel.work_stealing import for_each_world
@@ -20,6 +21,7 @@ from physics.kernels.queries.query_scratch import pose_world
 from physics.kernels.queries.ray_shapes import (
     ray_block,
     ray_capsule,
+    ray_cylinder,
     ray_ellipsoid,
     ray_plane,
     ray_polyhedron,
@@ -67,6 +69,8 @@ def _ray_body(b, o, d, scratch):
     arm, way, dims = qt.transposed_matvec(R, arm), qt.transposed_matvec(R, d), (dims[0], dims[1], dims[2])
     if is_capsule(b, scratch):
         t, n = ray_capsule(arm, way, dims)
+    elif is_cylinder(b, scratch):
+        t, n = ray_cylinder(arm, way, dims)
     elif shape == BLOCK:
         t, n = ray_block(arm, way, dims)
     elif shape == HULL:

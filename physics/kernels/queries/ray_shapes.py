@@ -163,6 +163,24 @@ def ray_capsule(o, d, dims):
     return t, times(1.0 / math.sqrt(qt.dot(n, n)), n)
 
 
+@inlined
+def ray_cylinder(o, d, dims):
+    """First point of a ray on a cylinder along y with half extents `dims`.
+
+    The normal is that of the side, or that of an end, whichever the point is nearer to.
+    """
+    r, half = dims[0], dims[1]
+    near, last = _stay_in_tube(o, d, r, half)
+    if near > last or last < 0.0:
+        return MISS
+    t = near if near >= 0.0 else last
+    x = plus(o, times(t, d))
+    across = math.sqrt(x[0] * x[0] + x[2] * x[2])
+    if abs(abs(x[1]) - half) <= abs(across - r):
+        return t, (0.0, math.copysign(1.0, x[1]), 0.0)
+    return t, (x[0] / across, 0.0, x[2] / across)
+
+
 @kernel
 def ray_polyhedron(o, d, first, last, normals, offsets):
     """First point of a ray on a convex polyhedron: the ray is inside while it is below the planes of all faces.

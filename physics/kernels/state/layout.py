@@ -46,6 +46,7 @@ ELLIPSOID = 2
 HULL = 3  # corners are in the tables `many.hulls`
 CAPSULE = 4
 COMPOUND = 5  # its parts are in the table `many.bodies.parts`
+CYLINDER = 6
 
 # Contact features of a block at a wall: its eight vertices. Spheres and ellipsoids have one, their lowest point.
 VERTEX_COUNT = 8

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 import physics
+from physics.rotations import rotation_matrices
 from physics.scene.canonical_scenes import GRAVITY
 from rigid_env.hard_cases.case import Case, Check, Setting, within
 from rigid_env.hard_cases.cases.scenery import FLOOR, laws, turned
+
+COIN = physics.Cylinder(0.0125, 0.002, 0.005, pos=(0, 0.001, 0))
 
 BOX = physics.Block((0.5, 0.3, 0.4), 2.0, pos=(-1, 0.15, 0), linvel=(3, 0, 0))
 
@@ -143,10 +147,63 @@ def press(on: Setting) -> Sequence[Check]:
     ]
 
 
+def coin_spins_down(on: Setting) -> Sequence[Check]:
+    """A coin on its face spins down at 2 μ g/r by friction at its rim; on its edge it falls, and never gains energy.
+
+    On the face, points of the rim carry all the load, so that friction has the torque μ m g r, and the moment of
+    inertia is m r²/2: ω = ω₀ - 2 μ g t/r, until it rests. Each step of length h leaves at most a share ε of the speed
+    that loads give. Friction opposes the slip of points that turn by ω h/2 until the end of the step, so that it is
+    less by a share (ω h/2)²/2 at most. The energy is m r² ω²/4, so that its error is m r² ω/2 times that of ω.
+
+    Then the coin stands on its edge, leans by 0.3 rad, and turns at 12 rad/s. It is too slow to stay up: it falls,
+    rolls on its rim ever faster, and slips. Friction only takes energy. A solve that leaves ε of the speed may give
+    ε of it.
+    """
+    r, mu, spin = COIN.radius, 0.2, 40.0
+    world = on.world(physics.Scene([replace(COIN, angvel=(0, spin, 0))], [FLOOR], laws(0.0, mu)))
+    world.step(steps=on.steps(0.05))
+    slower = spin - 2 * mu * GRAVITY * world.time / r
+    energy = 0.25 * COIN.mass * (r * spin) ** 2
+    off = 20 * _solved(on) * GRAVITY * world.time / r + (spin - slower) * (spin * on.dt) ** 2 / 8
+    left = 0.25 * COIN.mass * r * r * world.angvel[0, 0, 1] ** 2
+    world.step(steps=on.steps(0.25))
+    lean = 0.5 * math.pi - 0.3
+    height = r * math.sin(lean) + 0.5 * COIN.height * math.cos(lean)
+    quat = (math.cos(lean / 2), math.sin(lean / 2), 0, 0)
+    coin = replace(COIN, pos=(0, height, 0), quat=quat, angvel=(0, 12, 0))
+    falling = on.world(physics.Scene([coin], [FLOOR], laws(0.0, mu)))
+    energies = [_energy(coin, falling)]
+    for _ in range(on.steps(on.pick(1.5, 0.3) if not on.is_event_driven else on.pick(0.1, 0.03))):
+        falling.step()
+        energies.append(_energy(coin, falling))
+    return [
+        within("energy left on its face", left / energy, (slower / spin) ** 2, 2 * off / spin),
+        Check("spin at last", float(np.abs(world.angvel).max()), off, "rad/s"),
+        Check("gain of energy on its edge", max(np.diff(energies)) / energies[0], 10 * _solved(on)),
+    ]
+
+
+def _energy(coin: physics.Cylinder, world) -> float:
+    """Energy of a coin above the floor [J]."""
+    axis = rotation_matrices(world.quat[0, 0])[:, 1]
+    turn, (across, along, _) = world.angvel[0, 0], np.diag(coin.inertia)
+    spin = float(turn @ axis)
+    turning = along * spin**2 + across * float(turn @ turn - spin**2)
+    v = world.linvel[0, 0]
+    return 0.5 * (coin.mass * float(v @ v) + turning) + coin.mass * GRAVITY * float(world.pos[0, 0, 1])
+
+
 CASES = (
     Case(62, "joint", "a block slides over the joint of fixed boxes", "v = v₀ - μ g t, and nothing turns", joint),
     Case(63, "wedge", "a wedge of 10° between fixed plates", "each pushes with W/(2 sin 5°)", wedge),
     Case(64, "capsule-upright", "a capsule stands on its end", "it does not turn", capsule_upright),
     Case(65, "belt-reverses", "a belt reverses under a block that slips", "ways under μ g", belt_reverses),
     Case(66, "press", "a plate pushes blocks of 1 kg and 1,000,000 kg", "both have its speed, no overlap", press),
+    Case(
+        67,
+        "coin",
+        "a coin spins down on its face, and on its edge",
+        "ω₀ - 2 μ g t/r; no gain of energy",
+        coin_spins_down,
+    ),
 )

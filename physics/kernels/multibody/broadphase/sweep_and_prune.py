@@ -19,6 +19,7 @@ from physics.kernels.multibody.data.arrays import NUM_DROPPED, NUM_PAIRS
 from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
+from physics.kernels.multibody.data.cylinders import cylinder_half_extent, is_cylinder
 from physics.kernels.multibody.data.fixed_bodies import may_form_pair
 from physics.kernels.multibody.data.parts import is_compound
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
@@ -89,6 +90,8 @@ def half_extent(b, axis, many):
         return d[0]
     if is_capsule(b, many):
         return half_length(b, many) * abs(R[b, 3 * axis + 1]) + d[0]
+    if is_cylinder(b, many):
+        return cylinder_half_extent(d, R[b, 3 * axis + 1])
     if shape == HULL or is_compound(b, many):
         shape = BLOCK
     e = (d[0] * R[b, 3 * axis], d[1] * R[b, 3 * axis + 1], d[2] * R[b, 3 * axis + 2])

@@ -130,6 +130,8 @@ def make_bodies_workspace(
         Collision group and mask of each body, then of each wall; copied. None: all may touch.
     capsules : True or None
         Whether some bodies or parts are capsules.
+    cylinders : True or None
+        Whether some bodies or parts are cylinders.
     parts : sequence of Part
         Parts of the compounds, sorted by their bodies; `polyhedra` has a row for each of them, behind the bodies.
     materials : tuple of two
@@ -143,12 +145,13 @@ def make_bodies_workspace(
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
     """
-    parts, capsules = settings.pop("parts", ()), settings.pop("capsules", None)
+    parts, capsules, cylinders = (settings.pop(name, None) for name in ("parts", "capsules", "cylinders"))
+    parts = parts or ()
     contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra)
-    made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, capsules, parts)
+    made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, parts)
     acting = ActingBodies(made.body[:bodies], made.state, made.touched, made.fixed)
     return BodiesWorkspace(
-        bodies=made._replace(parts=make_parts(bodies, parts, contacts, acting)),
+        bodies=made._replace(capsules=capsules, cylinders=cylinders, parts=make_parts(bodies, parts, contacts, acting)),
         broadphase=_make_broad_phase(bodies),
         narrowphase=_make_narrow_phase(polyhedra),
         contacts=_make_contacts(contacts),
@@ -172,7 +175,6 @@ def _make_bodies(
     relative_slop: float,
     fixed: np.ndarray | None,
     groups: np.ndarray | None,
-    capsules: bool | None,
     parts: Sequence[Part],
 ) -> Bodies:
     records = np.zeros(bodies + len(parts), np.dtype(body_fields(terms, materials=materials)))
@@ -196,7 +198,8 @@ def _make_bodies(
         lift_work=np.zeros(bodies),
         fixed=None if fixed is None else fixed.copy(),
         groups=None if groups is None else groups.copy(),
-        capsules=capsules,
+        capsules=None,
+        cylinders=None,
         parts=None,
     )
 

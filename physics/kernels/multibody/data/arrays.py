@@ -112,6 +112,7 @@ class Bodies(NamedTuple):
     fixed: np.ndarray | None  # (bodies,) int, 1: the body is fixed; None in a world without fixed bodies
     groups: np.ndarray | None  # (bodies + walls, 2) int, group and mask of each; None in a world where all may touch
     capsules: bool | None  # None in a world without capsules
+    cylinders: bool | None  # None in a world without cylinders
     parts: Parts | None  # None in a world without compounds
 
 

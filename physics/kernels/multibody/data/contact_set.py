@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.materials import friction_at, restitution_at
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
@@ -13,6 +13,8 @@ from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
+from physics.kernels.multibody.data.cylinder_balls import normal_beside_cylinder
+from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rim_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -367,12 +369,26 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 
 @inlined
+def rolls_on_rim(k, b, many):
+    """True if body or part b is a cylinder whose point in contact k, with a wall, rolls along a rim."""
+    is_at_wall = is_cylinder(b, many) and body_at(many.contacts.bodies[k, 1], many) < 0
+    return is_at_wall and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
+
+
+@if_given("many.bodies.cylinders", False)
+def may_roll(k, many):
+    """True if the point of contact k rolls along a rim of a cylinder."""
+    return rolls_on_rim(k, first_part(k, many), many)
+
+
+@inlined
 def _carried_point(b, k, first, side, n, many):
     """Arm of a body in contact k after its motion since the contact was found, at its part b, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
     contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
-    body's anchor; `side` is -1 for the first body and 1 for the second.
+    body's anchor; `side` is -1 for the first body and 1 for the second. On a rim of a cylinder it may roll
+    (`cylinders`).
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
@@ -381,6 +397,10 @@ def _carried_point(b, k, first, side, n, many):
     if shape == ELLIPSOID:
         dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return from_body(b, geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m)), many)
+    if rolls_on_rim(k, b, many):
+        end = many.contacts.id[k] % FEATURES_PER_PAIR
+        arm = rim_arm(b, end, row_matrix(many.bodies.rotation, b), (side * n[0], side * n[1], side * n[2]), many)
+        return from_body(b, arm, many)
     arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 
@@ -390,7 +410,7 @@ def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its parts a and b; return its normal, world frame.
 
     A normal with an owner turns with it. The normal of two spheres stays along the line of their centres, and
-    that of two balls of capsules likewise. Any other normal stays as it is.
+    that of two balls of capsules likewise, and that of a ball stays across a cylinder. Any other normal stays as it is.
     """
     n, owner = row_vector(many.contacts.normal, k, 0), many.contacts.owner[k]
     if owner >= 0:
@@ -404,6 +424,9 @@ def _turn_frame(k, a, b, many):
             write_contact_frame(k, n, many)
     elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
         n = normal_between_axes(k, a, b, n, many)
+        write_contact_frame(k, n, many)
+    elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
+        n = normal_beside_cylinder(k, a, b, n, many)
         write_contact_frame(k, n, many)
     return n
 

@@ -24,6 +24,7 @@ from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_STOPPING
 from physics.kernels.multibody.data.capsules import half_axis, is_capsule
 from physics.kernels.multibody.data.contact_set import is_stopping, pair_slop, row_matrix
+from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
 from physics.kernels.multibody.data.parts import body_of
 from physics.kernels.multibody.data.warm_start import copy_contact
@@ -114,6 +115,8 @@ def _depth(part, x, many):
     if is_capsule(part, many) or many.bodies.body[part].shape == SPHERE:
         return d[0] - math.sqrt(qt.dot(y, y))
     y = qt.transposed_matvec(row_matrix(many.bodies.rotation, part), y)
+    if is_cylinder(part, many):
+        return min(d[0] - math.sqrt(y[0] * y[0] + y[2] * y[2]), d[1] - abs(y[1]))
     f = (y[0] / d[0], y[1] / d[1], y[2] / d[2])
     return (1.0 - math.sqrt(qt.dot(f, f))) * min(d[0], min(d[1], d[2]))
 

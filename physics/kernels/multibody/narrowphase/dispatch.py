@@ -20,6 +20,8 @@ from physics.kernels.multibody.narrowphase.box_box import collide_blocks
 from physics.kernels.multibody.narrowphase.capsule import collide_capsule
 from physics.kernels.multibody.narrowphase.capsule_contacts import collide_capsule_wall
 from physics.kernels.multibody.narrowphase.covered_points import leave_out_covered
+from physics.kernels.multibody.narrowphase.cylinder import collide_cylinder
+from physics.kernels.multibody.narrowphase.cylinder_wall import collide_cylinder_wall
 from physics.kernels.multibody.narrowphase.ellipsoid_distance import collide_ellipsoid
 from physics.kernels.multibody.narrowphase.hull_ellipsoid import collide_ellipsoid_hull, collide_sphere_hull
 from physics.kernels.multibody.narrowphase.hull_hull import collide_hulls
@@ -36,14 +38,14 @@ def _collide_with_wall(b, wall, margin, h, hulls, many):
         if many.bodies.body[b].shape == HULL:
             collide_hull_wall(b, wall, margin, h, many)
             return
-    if not collide_capsule_wall(b, wall, margin, h, many):
+    if not (collide_capsule_wall(b, wall, margin, h, many) or collide_cylinder_wall(b, wall, margin, h, many)):
         collide_body_wall(b, wall, margin, h, many)
 
 
 @kernel
 def _collide(a, b, margin, h, ellipsoids, hulls, many):
     """Add the contacts of two bodies or parts whose gaps are at most `margin` [m]."""
-    if collide_capsule(a, b, margin, h, ellipsoids, many):
+    if collide_cylinder(a, b, margin, h, many) or collide_capsule(a, b, margin, h, ellipsoids, many):
         return
     first, second = many.bodies.body[a].shape, many.bodies.body[b].shape
     if hulls is not None:

@@ -19,6 +19,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.capsules import farthest_axis_end, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
+from physics.kernels.multibody.data.cylinders import cylinder_support_arm, is_cylinder
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, LAST_CORNER
 from physics.kernels.state.layout import BLOCK, HULL, SPHERE
 
@@ -53,6 +54,8 @@ def support_point(b, x, R, k, thinner, hulls, many):
         return add_scaled(x, d[0] - thinner, k)
     if is_capsule(b, many):
         return add_scaled(add_scaled(x, 1.0, farthest_axis_end(b, R, k, many)), d[0] - thinner, k)
+    if is_cylinder(b, many):
+        return add_scaled(x, 1.0, cylinder_support_arm((d[0] - thinner, d[1] - thinner), R, k))
     e = qt.transposed_matvec(R, k)
     if hulls is not None:  # noqa: SIM102 (a branch of its own is what the compiler prunes)
         if shape == HULL:

@@ -39,6 +39,7 @@ from physics.kernels.multibody.broadphase.sweep_and_prune import may_meet, may_r
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
 from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
+from physics.kernels.multibody.data.cylinders import cylinder_support, is_cylinder
 from physics.kernels.multibody.data.driven_bodies import acceleration_of, spin_of, state_after
 from physics.kernels.multibody.data.parts import body_of, posed_part
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
@@ -132,6 +133,8 @@ def _support(b, R, k, hulls, many):
             return qt.dot(e, hull_support_vertex(b, e, many))
     if is_capsule(b, many):
         return capsule_support(b, R, k, many)
+    if is_cylinder(b, many):
+        return cylinder_support(b, R, k, many)
     return support_of_vector(shape, (d[0], d[1], d[2]), R, k)
 
 

@@ -20,6 +20,7 @@ from physics.kernels.multibody.data.arrays import LOADED_MOMENTA, PRE_LOAD_VELOC
 from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
+from physics.kernels.multibody.data.cylinders import cylinder_support, is_cylinder
 from physics.kernels.multibody.data.driven_bodies import driven_velocity, driven_work
 from physics.kernels.multibody.data.parts import is_compound, place_parts
 from physics.kernels.state import layout as at
@@ -170,6 +171,8 @@ def clamp_body_inside_walls(b, many):
         reach = body.radius
         if is_capsule(b, many):
             reach = capsule_support(b, row_matrix(many.bodies.rotation, b), n, many)
+        elif is_cylinder(b, many):
+            reach = cylinder_support(b, row_matrix(many.bodies.rotation, b), n, many)
         elif body.shape != HULL and not is_compound(b, many):
             reach = geo.support(
                 body.shape, dims, geo.scaled_normal(body.shape, dims, row_matrix(many.bodies.rotation, b), n)

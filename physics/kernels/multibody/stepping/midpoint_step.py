@@ -23,16 +23,21 @@ from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import follow_edges
 from physics.kernels.multibody.data.contact_set import (
+    FEATURES_PER_PAIR,
     add_scaled,
+    may_roll,
     pair_slop,
     parted_slack,
     put_vector,
     relative_acceleration_bound,
+    rolls_on_rim,
     row_matrix,
     slip_velocity,
     subtract,
     update_contacts,
 )
+from physics.kernels.multibody.data.cylinder_balls import less_turn_beside_cylinder
+from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rim_arm_rate
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
     moving_body_at,
@@ -92,8 +97,10 @@ def _centripetal(b, k, first, side, h, many):
     """Acceleration ω x ṙ of part b's point in contact k, world frame [m/s²].
 
     Of a sphere it is that of its centre, under which the contact point stays: 0 unless it is a part of a compound. Of a
-    capsule it is that of the ball's centre, since its point stays under a point of its axis. It is also 0 if the body
-    turns by more than `MAX_TARGET_TURN` in a stage of length h [s], since it then says nothing about the stage's end.
+    capsule it is that of the ball's centre, since its point stays under a point of its axis. That of a cylinder
+    includes α x r for the angular acceleration α of free turning, which points of thin disks feel. It is also 0 if the
+    body turns by more than `MAX_TARGET_TURN` in a stage of length h [s], or its point rolls so far, since it then says
+    nothing about the stage's end.
     `first` is the column of the body's arm; `side` is -1 for the first body of the contact, 1 for the second.
     """
     shape, w = many.bodies.body[b].shape, row_vector(many.bodies.twist, body_of(b, many), 3)
@@ -106,10 +113,17 @@ def _centripetal(b, k, first, side, h, many):
         n = (-side * n[0], -side * n[1], -side * n[2])
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return plus_turning(b, qt.cross(w, rate), many)
+    if rolls_on_rim(k, b, many):
+        end, n = many.contacts.id[k] % FEATURES_PER_PAIR, row_vector(many.contacts.frame, k, 0)
+        n = (side * n[0], side * n[1], side * n[2])
+        rate = rim_arm_rate(b, end, row_matrix(many.bodies.rotation, b), w, n, many)
+        if qt.dot(rate, rate) * h * h > (MAX_TARGET_TURN * many.bodies.body[b].radius) ** 2:
+            return (0.0, 0.0, 0.0)
+        return plus_free_turn(k, b, first, plus_turning(b, qt.cross(w, rate), many), many)
     arm = row_vector(many.contacts.arm, k, first)
     if is_capsule(b, many):
         arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
-    return qt.cross(w, qt.cross(w, arm))
+    return plus_free_turn(k, b, first, qt.cross(w, qt.cross(w, arm)), many)
 
 
 @inlined
@@ -154,6 +168,7 @@ def _turning(k, b, h, many):
     t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
     t = (t[0] - half * _turn_of_line(one, other, many), t[1], t[2])
     t = less_turn_of_axes(k, one, other, half, t, many)
+    t = less_turn_beside_cylinder(k, one, other, half, t, many)
     if many.settings[0].is_error_controlled == 1 or has_fixed(many):
         t = (t[0] + h * _coriolis(k, many), t[1], t[2])
     return t
@@ -165,7 +180,9 @@ def set_resting_targets(n, h, many):
 
     They follow `contact_law.target_velocity.set_resting_targets`. A contact with a gap at the start may close the rest
     of it, measured at the middle, in the second half of the stage. Under error control, the gap that a point gains only
-    by its motion on a circle is left out: it would cause an error of first order in the velocity.
+    by its motion on a circle is left out: it would cause an error of first order in the velocity. Targets of points
+    that roll are not clamped: the clamp of one that hardly moves is on in one stage and off in the next. Such a stage
+    is still checked for a gain of energy.
     """
     half, long = 0.5 * h, closing_time(h, many)
     for k in range(n):
@@ -175,10 +192,12 @@ def set_resting_targets(n, h, many):
         t = _turning(k, b, h, many)
         exchange_twists(a, many)
         gap = many.contacts.gap[k]
-        if many.settings[0].is_error_controlled == 1 or has_fixed(many):
+        if many.settings[0].is_error_controlled == 1 or has_fixed(many) or has_cylinders(many):
             gap += 0.5 * half * t[0]
         u = qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many))
-        t = mean_slip_target(k, clamp_target_to_energy(t, u), u, many)
+        if not may_roll(k, many):
+            t = clamp_target_to_energy(t, u)
+        t = mean_slip_target(k, t, u, many)
         if many.contacts.target[k, 0] == FORETOLD:
             t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
         elif gap > slop:

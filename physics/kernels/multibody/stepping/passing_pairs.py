@@ -34,6 +34,7 @@ from physics.kernels.multibody.data.contact_set import (
     row_matrix,
     subtract,
 )
+from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.driven_bodies import attitude_after
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
@@ -173,6 +174,8 @@ def _holds_point(b, p, thinner, hulls, many):
     if is_capsule(b, many):
         y = half_length(b, many)
         p = (p[0], p[1] - min(max(p[1], -y), y), p[2])
+    if is_cylinder(b, many):
+        return abs(p[1]) < d[1] - thinner and p[0] * p[0] + p[2] * p[2] < (d[0] - thinner) ** 2
     if shape == SPHERE or is_capsule(b, many):
         return qt.dot(p, p) < (d[0] - thinner) ** 2
     d = (d[0] - thinner, d[1] - thinner, d[2] - thinner)

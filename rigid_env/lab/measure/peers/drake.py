@@ -72,7 +72,7 @@ class Drake:
         """Build a scene in Drake, see `contender.Engine.open`."""
         refuse_meetings(scene)
         for body in scene.bodies:
-            if body.kind in ("hull", "capsule", "compound"):
+            if body.kind in ("hull", "capsule", "cylinder", "compound"):
                 raise Unsupported(f"{body.kind}s are not handed to Drake")
         if options.pop("is_fitted", False):
             options["dissipation"] = dissipation(scene)

@@ -13,13 +13,16 @@ from __future__ import annotations
 import numpy as np
 
 import physics
-from physics.io.mjcf.capsule_frames import OF_GEOM
+from physics.io.mjcf.capsule_frames import OF_GEOM, WITH_AXIS
 from physics.rotations import rotation_matrices
 from rigid_env.lab.measure.machine import version
 from rigid_env.lab.measure.peers.contender import State, Unsupported, friction, gravity, restitution, walls
 
 HARD = "0.9999 0.9999 0.001 0.5 2"  # solimp: as rigid as MuJoCo allows
-KINDS = {"block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule"}
+KINDS = {
+    "block": "box", "sphere": "sphere", "ellipsoid": "ellipsoid", "hull": "mesh", "capsule": "capsule",
+    "cylinder": "cylinder",
+}  # fmt: skip
 
 FREE = {
     "default": {},
@@ -161,9 +164,10 @@ def _reference(contact: str, e: float, dt: float, share: float) -> str:
 def _body_xml(b: int, body: physics.Body, surface: str) -> str:
     I = body.inertia
     extent = f'mesh="hull{b}"' if body.kind == "hull" else f'size="{_text(body.dimensions)}"'
-    if body.kind == "capsule":
+    if body.kind in WITH_AXIS:
         radius, reach = body.dimensions[:2]
-        extent = f'size="{_text((radius, reach - radius))}" quat="{_text(OF_GEOM)}"'
+        half = reach - radius if body.kind == "capsule" else reach
+        extent = f'size="{_text((radius, half))}" quat="{_text(OF_GEOM)}"'
     shape = f'type="{KINDS[body.kind]}" {extent} contype="2"'
     full = (I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2])
     return (

@@ -57,7 +57,7 @@ class PyBullet:
         for body in scene.bodies:
             if body.kind == "ellipsoid":
                 raise Unsupported("PyBullet has no ellipsoid")
-            if body.kind in ("hull", "capsule", "compound"):
+            if body.kind in ("hull", "capsule", "cylinder", "compound"):
                 raise Unsupported(f"{body.kind}s are not handed to PyBullet")
             if (body.inertia - np.diag(np.diag(body.inertia))).any():
                 raise Unsupported("PyBullet takes the moments of inertia along the body's axes only")
