@@ -235,9 +235,10 @@ class _Resistance(Effect):
 @known_keywords
 @dataclass(frozen=True)
 class RollingFriction(_Resistance):
-    """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
+    """Rolling resistance at contacts of round bodies: a torque of at most ``radius`` times the normal force.
 
-    The torque opposes the component of the angular velocity along the wall; it may stop it, but never reverses it.
+    Spheres, ellipsoids and capsules are round. The torque opposes the component of their angular velocity along the
+    wall or body that they touch, relative to it. It may stop it, but never reverses it.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ class RollingFriction(_Resistance):
 @known_keywords
 @dataclass(frozen=True)
 class SpinFriction(_Resistance):
-    """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
+    """Friction of round bodies that spin on a wall or body: a torque of at most ``radius`` times the normal force.
 
     The torque opposes the component of the angular velocity along the wall's normal; it may stop it, but never reverses
     it.

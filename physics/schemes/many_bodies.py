@@ -15,6 +15,7 @@ from physics.kernels.multibody.stepping.adaptive_substep import (
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.effects import Contact
 from physics.scene.groups import group_table
@@ -26,6 +27,12 @@ from physics.schemes import objections
 from physics.schemes.body_memory import BodyMemory
 from physics.schemes.material_tables import pair_materials, wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
+
+_OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
+"""Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
+
+KNOWN_LAWS = _OF_STAGES
+"""Contact laws that this scheme supports."""
 
 
 def _meetings(scene: Scene, switches: Switches) -> int:
@@ -57,17 +64,12 @@ class ManyBodies(Scheme):
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
-        is_coupled = is_coupled or needs.compounds
+        is_coupled = is_coupled or needs.compounds or (is_precise and bool(_OF_STAGES & set(needs.laws)))
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
-        if not found and (names := objections.declared_laws(needs)):
-            found = (
-                f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, capsules, compounds, fixed bodies, groups "
-                "that keep some bodies from some walls, and Spring between bodies"
-            )
+        found = found or objections.to_laws_at_walls(scene, needs, KNOWN_LAWS)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
@@ -80,7 +82,8 @@ class ManyBodies(Scheme):
             groups=group_table(scene) if switches.grouped else None,
             capsules=switches.capsules, parts=part_list(scene.bodies) if switches.compounds else (),
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            motion_columns=switches.motion_columns, lone=switches.lone, meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, laws=switches.laws, lone=switches.lone,
+            meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip
@@ -90,7 +93,7 @@ class ManyBodies(Scheme):
         if not self.is_error_controlled:
             return None
         bodies, parts, walls = len(scene.bodies), part_count(scene.bodies), len(scene.walls)
-        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies))
+        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies), laws=switches.laws)
         return allocation.make_snapshots(bodies, memory, switches.lone)
 
     def acting(self, accuracy: Accuracy) -> Accuracy:

@@ -197,7 +197,7 @@ def _write_effects(world: Batch, chosen, params, effects) -> None:
         if isinstance(effect, Friction):
             _check_settings(effect, world.scene.effect(Friction))
             materials.write_scene_friction(params, world.scene, effect)
-    parameters.write_laws(params, world.plan.laws, laws)
+    parameters.write_laws(params, world.plan, laws)
     fields = [effect for effect in effects if effect not in laws]
     write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
 

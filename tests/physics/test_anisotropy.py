@@ -251,7 +251,7 @@ BAD = [
     (lambda: on([FLOOR], physics.Friction((0.1, 0.2), (Z, Z))), "Friction.axis has 2 directions; allowed are one"),
     (
         lambda: on([FLOOR], physics.Friction((0.1, 0.2), Z), [slab(), slab(pos=(3, 1, 0))]),
-        "holds Friction with two coefficients, which act between a body and a wall; allowed are scenes of one body",
+        "Friction with two coefficients, known at walls only, and bodies may touch each other; allowed is",
     ),
 ]
 

@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.contact_set import (
     relative_acceleration_bound,
     smaller_radius,
 )
+from physics.kernels.multibody.data.warm_torques import clear_torque
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
 from physics.kernels.multibody.stepping.sudden_change import count_impact
@@ -192,6 +193,7 @@ def set_impact_targets(n, h, is_last, many):
             fastest = k
         put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+        clear_torque(k, many)
     if is_impact:
         fastest = _extend_impact(n, h, fastest, many)
     return fastest
