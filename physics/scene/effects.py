@@ -61,9 +61,9 @@ class Contact(Effect):
     between_bodies : bool, optional
         True: bodies touch walls and each other. False: they touch walls only, and pass through each other.
     tangential : float, optional
-        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993). The point of contact leaves an impact
-        with -e_t times its tangential velocity, as far as the cone of `Friction` allows. 1: a superball; 0: the point
-        sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
+        Tangential coefficient e_t in [-1, 1] of spheres, at walls, fixed bodies and each other (Walton 1993). The
+        point of contact leaves an impact with -e_t times its tangential velocity, as far as the cone of `Friction`
+        allows. 1: a superball; 0: the point sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
     stiffness : float, optional
         k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall [N/m]; greater
         than 0. The spring pushes with k times the depth; it makes a body bounce, and `restitution` must be None.

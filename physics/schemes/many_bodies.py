@@ -15,7 +15,7 @@ from physics.kernels.multibody.stepping.adaptive_substep import (
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.effects import Contact
 from physics.scene.groups import group_table
@@ -31,7 +31,7 @@ from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 _OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
 """Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
 
-KNOWN_LAWS = _OF_STAGES
+KNOWN_LAWS = _OF_STAGES | {LAW_TANGENTIAL}
 """Contact laws that this scheme supports."""
 
 
@@ -64,12 +64,14 @@ class ManyBodies(Scheme):
     def takes(self, needs: Needs, accuracy: Accuracy) -> bool:
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
-        is_coupled = is_coupled or needs.compounds or (is_precise and bool(_OF_STAGES & set(needs.laws)))
+        is_coupled = is_coupled or needs.compounds
+        is_coupled = is_coupled or (is_precise and bool(_OF_STAGES & set(needs.laws)))
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
         found = found or objections.to_laws_at_walls(scene, needs, KNOWN_LAWS)
+        found = found or objections.to_tangential(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:

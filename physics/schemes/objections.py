@@ -68,10 +68,10 @@ def to_sleeping(needs: Needs) -> str:
 def to_tangential(scene: Scene, needs: Needs) -> str:
     """Message against tangential restitution in a scene with bodies other than spheres; "" if there is no conflict."""
     for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in needs.laws else ()):
-        if body.kind != "sphere":
+        if body.kind != "sphere" and not body.fixed:
             return (
                 f"Contact.tangential is {needs.contact.tangential}, but Scene.bodies[{b}] is a {body.kind}; allowed "
-                "where every body is a sphere: of others it would not say how an impact ends"
+                "where every body that moves is a sphere: of others it would not say how an impact ends"
             )
     return ""
 
