@@ -54,11 +54,13 @@ class Needs:
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
     lone : bool
-        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound.
+        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound; or it is `grained`.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
         Numbers of a body for its prescribed motion; 0 if no body has one.
+    grained : bool
+        Whether bodies have axes of friction of their own, which turn with them.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -93,6 +95,7 @@ class Needs:
     lone: bool
     grouped: bool
     motion_columns: int
+    grained: bool
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -146,6 +149,7 @@ def find_needs(scene: Scene) -> Needs:
     motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
+    grained = touching and friction is not None and bool(friction.body_axes)
     return Needs(
         contact, friction, gravity, touching, meeting, fixed,
         rubbing=touching and friction is not None,
@@ -153,9 +157,10 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
-        lone=meeting and fixed and len(axes) == 1 and "compound" not in kinds,
+        lone=((meeting and fixed) or grained) and len(axes) == 1 and "compound" not in kinds,
         grouped=grouped,
         motion_columns=motion_columns,
+        grained=grained,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,

@@ -9,15 +9,17 @@ import numpy as np
 
 from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
 from physics.kernels.multibody.data import allocation
+from physics.kernels.multibody.data.arrays import Grain
 from physics.kernels.multibody.stepping.adaptive_substep import (
     LONE_RELATIVE_SLOP,
     MIN_RELATIVE_SLOP,
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL
 from physics.kernels.state.groups import MultibodySwitches
-from physics.scene.effects import Contact
+from physics.scene.body_axes import axis_table
+from physics.scene.effects import Contact, Friction
 from physics.scene.groups import group_table
 from physics.scene.needs import Needs
 from physics.scene.parts import part_count, part_list
@@ -31,7 +33,7 @@ from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 _OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
 """Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
 
-KNOWN_LAWS = _OF_STAGES | {LAW_TANGENTIAL}
+KNOWN_LAWS = _OF_STAGES | {LAW_TANGENTIAL, LAW_ANISOTROPY}
 """Contact laws that this scheme supports."""
 
 
@@ -41,6 +43,16 @@ def _meetings(scene: Scene, switches: Switches) -> int:
     if contact is None or not switches.meeting:
         return 0
     return 1 if contact.between_bodies else 2
+
+
+def _grain(scene: Scene, switches: Switches) -> Grain | None:
+    """Axes of friction with two coefficients; None with one coefficient."""
+    friction: Any = scene.effect(Friction)
+    if LAW_ANISOTROPY not in switches.laws:
+        return None
+    axis = np.array(friction.axis)
+    axis = axis / np.linalg.norm(axis) if axis.ndim == 1 else np.zeros(3)
+    return Grain(axis, axis_table(scene, friction.body_axes))
 
 
 class ManyBodies(Scheme):
@@ -65,13 +77,13 @@ class ManyBodies(Scheme):
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
         is_coupled = is_coupled or needs.compounds
-        is_coupled = is_coupled or (is_precise and bool(_OF_STAGES & set(needs.laws)))
+        is_coupled = is_coupled or needs.grained or (is_precise and bool(_OF_STAGES & set(needs.laws)))
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
         found = found or objections.to_laws_at_walls(scene, needs, KNOWN_LAWS)
-        found = found or objections.to_tangential(scene, needs)
+        found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
@@ -84,7 +96,8 @@ class ManyBodies(Scheme):
             groups=group_table(scene) if switches.grouped else None,
             capsules=switches.capsules, parts=part_list(scene.bodies) if switches.compounds else (),
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            motion_columns=switches.motion_columns, laws=switches.laws, lone=switches.lone,
+            motion_columns=switches.motion_columns, laws=switches.laws, grain=_grain(scene, switches),
+            lone=switches.lone,
             meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),

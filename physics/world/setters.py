@@ -315,7 +315,7 @@ def _needs(field: str, is_on, effect: str) -> None:
 
 def _check_settings(friction: Friction, declared: Friction) -> None:
     """Refuse a `Friction` that differs from the scene's in a setting that all worlds share."""
-    for name in ("axis", "rule", "pairs"):
+    for name in ("axis", "rule", "pairs", "body_axes"):
         given, own = getattr(friction, name), getattr(declared, name)
         if given != own:
             raise ValueError(

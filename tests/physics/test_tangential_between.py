@@ -69,6 +69,7 @@ def test_a_ball_is_thrown_back_in_closed_form_at_precise(ground):
     assert built.angvel[0, 0] == pytest.approx(w, abs=1e-8)
 
 
+@pytest.mark.exhaustive
 def test_a_plastic_impact_at_precise_is_that_at_a_wall():
     """It leaves along the floor only, and rolls then."""
     wall, body = (thrown(where, 0.4, 0.0, dt=0.05, accuracy="precise") for where in ("wall", "fixed"))

@@ -33,6 +33,7 @@ from physics.kernels.multibody.data.arrays import (
     BroadPhase,
     ContactSet,
     DrivenBodies,
+    Grain,
     Islands,
     LinearSystem,
     LoneBody,
@@ -127,6 +128,7 @@ def make_bodies_workspace(
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     motion_columns: int = 0,
     laws: tuple[str, ...] = (),
+    grain: Grain | None = None,
     **settings: float,
 ) -> BodiesWorkspace:
     """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
@@ -156,6 +158,8 @@ def make_bodies_workspace(
         Columns of a prescribed motion (`flight.prescribed_motion`); 0: no body has one.
     laws : tuple of str
         Contact laws of the scene (`state.contact_law_dispatch.LAWS`), which add fields to the record of a body.
+    grain : Grain or None
+        Axes of friction with two coefficients; None: it has one coefficient.
     lone : True or None
         Whether exactly one body moves, and it can touch fixed bodies.
     settings : float
@@ -181,6 +185,7 @@ def make_bodies_workspace(
         driven=_make_driven(bodies, contacts, motion_columns),
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
+        grain=grain,
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )

@@ -278,6 +278,13 @@ class Resistance(NamedTuple):
     order: np.ndarray  # (history,) int, scratch
 
 
+class Grain(NamedTuple):
+    """Axes of friction with two coefficients, see `grain`."""
+
+    axis: np.ndarray  # (3,) unit vector or 0, of two bodies without an axis of their own, world frame
+    body_axis: np.ndarray  # (bodies, 3) unit vectors, or 0 for bodies without an axis, body frames
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -294,5 +301,6 @@ class BodiesWorkspace(NamedTuple):
     driven: DrivenBodies | None  # None: the scene declares no motion
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
     resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
+    grain: Grain | None  # None: the scene has no friction with two coefficients
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.materials import friction_at, restitution_at
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
@@ -15,6 +15,7 @@ from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
+from physics.kernels.multibody.data.grain import grain_tangents
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.multibody.data.parts import (
     body_of,
@@ -92,13 +93,14 @@ def tangent_basis(n):
 def write_contact_frame(k, n, many):
     """Write the frame (normal, two tangents) of contact k, for its unit normal n in the world frame.
 
-    If contact k - 1 has the same normal, its tangents are copied.
+    If contact k - 1 has the same normal, its tangents are copied. Those along axes of friction are in `grain`.
     """
     frame = many.contacts.frame
     if k > 0 and n == row_vector(frame, k - 1, 0):
         t1, t2 = row_vector(frame, k - 1, 3), row_vector(frame, k - 1, 6)
     else:
         t1, t2 = tangent_basis(n)
+    t1, t2 = grain_tangents(k, n, t1, t2, many)
     put_vector(frame, k, 0, n)
     put_vector(frame, k, 3, t1)
     put_vector(frame, k, 6, t2)
@@ -385,6 +387,12 @@ def _carried_point(b, k, first, side, n, many):
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 
 
+@if_given("many.grain")
+def turn_grain(k, n, many):
+    """Write the frame of contact k anew for its unchanged normal n, since axes of friction turn with their bodies."""
+    write_contact_frame(k, n, many)
+
+
 @inlined
 def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its parts a and b; return its normal, world frame.
@@ -405,6 +413,8 @@ def _turn_frame(k, a, b, many):
     elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
         n = normal_between_axes(k, a, b, n, many)
         write_contact_frame(k, n, many)
+    else:
+        turn_grain(k, n, many)
     return n
 
 
