@@ -33,7 +33,6 @@ from physics.kernels.multibody.data.arrays import (
     BroadPhase,
     ContactSet,
     DrivenBodies,
-    Grain,
     Islands,
     LinearSystem,
     LoneBody,
@@ -127,8 +126,6 @@ def make_bodies_workspace(
     groups: np.ndarray | None = None,
     materials: tuple[WallMaterials | None, PairMaterials | None] = (None, None),
     motion_columns: int = 0,
-    laws: tuple[str, ...] = (),
-    grain: Grain | None = None,
     **settings: float,
 ) -> BodiesWorkspace:
     """Allocate scratch memory for worlds of `bodies` bodies that touch each other.
@@ -166,7 +163,7 @@ def make_bodies_workspace(
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
     """
-    parts, capsules = settings.pop("parts", ()), settings.pop("capsules", None)
+    parts, capsules, laws = settings.pop("parts", ()), settings.pop("capsules", None), settings.pop("laws", ())
     contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra)
     fields = body_fields(terms, laws, materials[0])
     made = _make_bodies(bodies, fields, materials[0], settings.pop("relative_slop"), fixed, groups, capsules, parts)
@@ -185,7 +182,7 @@ def make_bodies_workspace(
         driven=_make_driven(bodies, contacts, motion_columns),
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
-        grain=grain,
+        grain=settings.pop("grain", None),
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )
