@@ -33,6 +33,7 @@ End = str | int
 """End of a contact: name of a body or wall, or index of a body, or -1 - k for wall k."""
 
 Pair = tuple[End, End, float]
+BodyAxis = tuple[End, Vector]
 """Two ends of a contact, and a coefficient of theirs."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])

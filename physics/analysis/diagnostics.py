@@ -16,7 +16,7 @@ from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.exclusive import exclusive
 from physics.scene.field_errors import raised
 from physics.summary import parts_repr
-from physics.world.parameters import masses_of
+from physics.world.parameters import law_column, masses_of
 from physics.world.wall_distance import wall_gaps
 from physics.world.world import World
 
@@ -72,9 +72,8 @@ def _diagnose(world: World) -> Diagnostics:
     potential = -mass * np.sum(world.gravity[:, None, :] * world.pos, axis=-1)
     if world.plan.fields:
         potential += _look_at(world)[1].reshape(shape)
-    laws = world.plan.laws
-    if LAW_STIFFNESS in laws:
-        energies, column = np.empty(len(world.state)), world.params.shape[1] - len(laws) + laws.index(LAW_STIFFNESS)
+    if LAW_STIFFNESS in world.plan.laws:
+        energies, column = np.empty(len(world.state)), law_column(world.params, world.plan, LAW_STIFFNESS)
         contact_spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
         potential += energies.reshape(shape)
     return Diagnostics(

@@ -194,7 +194,7 @@ def _resistance_row(scene, kind, law, laws) -> Row:
     if effect is None:
         return Row(name, False, "not declared", "")
     if law not in laws:
-        return Row(name, False, "declared, but no round body can touch a wall", "")
+        return Row(name, False, "declared, but only round bodies roll and spin, and none can touch anything", "")
     return Row(name, True, f"declared: {effect.radius} m", "the contact problem again, with a torque")
 
 

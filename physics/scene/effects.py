@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
-from physics.annotations import Effect, End, Pair, Rule, Vector
+from physics.annotations import BodyAxis, Effect, End, Pair, Rule, Vector
 from physics.html_table import fields_table
 from physics.keywords import known_keywords
+from physics.scene.body_axes import checked_axes
 from physics.scene.force_field import Field
 from physics.scene.pairs import FRICTION_RULE, RESTITUTION_RULE, checked_pairs, checked_rule
 from physics.summary import SHOWN_IF_GIVEN, fields_repr, shown
@@ -61,9 +62,9 @@ class Contact(Effect):
     between_bodies : bool, optional
         True: bodies touch walls and each other. False: they touch walls only, and pass through each other.
     tangential : float, optional
-        Tangential coefficient e_t in [-1, 1] of spheres at walls (Walton 1993). The point of contact leaves an impact
-        with -e_t times its tangential velocity, as far as the cone of `Friction` allows. 1: a superball; 0: the point
-        sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
+        Tangential coefficient e_t in [-1, 1] of spheres, at walls, fixed bodies and each other (Walton 1993). The
+        point of contact leaves an impact with -e_t times its tangential velocity, as far as the cone of `Friction`
+        allows. 1: a superball; 0: the point sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
     stiffness : float, optional
         k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall [N/m]; greater
         than 0. The spring pushes with k times the depth; it makes a body bounce, and `restitution` must be None.
@@ -148,8 +149,8 @@ class Friction(Effect):
         dissipates most (Goyal, Ruina and Papadopoulos 1991). Coefficients of bodies, walls and pairs are then μ1, and
         the ratio μ2/μ1 is the same everywhere.
     axis : (3,) or (walls, 3) array_like, optional
-        Direction of μ1, world frame: one for all walls, or one for each. Only its component along the wall counts. It
-        must be given with two coefficients, and only then.
+        Direction of μ1, world frame: one for all contacts, or one for each wall. Only its component along the contact
+        counts. It must be given with two coefficients, and only then.
     rule : str, optional
         Rule that combines the frictions of two bodies, or of a body and a wall with a friction: ``"minimum"``,
         ``"average"``, ``"geometric_mean"``, ``"product"`` or ``"maximum"``. At a wall without a friction the body's own
@@ -157,12 +158,16 @@ class Friction(Effect):
     pairs : dict or sequence, optional
         Exceptions to the rule: ``{("die", "tray"): 0.2}``, or a sequence of ``("die", "tray", 0.2)``. An end of a pair
         is the name of a body or wall, the index of a body, or -1 - k for wall k. The order of both ends does not count.
+    body_axes : dict or sequence, optional
+        Directions of μ1 in the frames of bodies, which turn with them: ``{"ski": (1, 0, 0)}``, by name or index. They
+        take the place of `axis`; of two bodies the axis of the first one acts. Only with two coefficients.
     """
 
     coefficient: float | tuple[float, float] = 0.5
     axis: Vector | tuple[Vector, ...] | None = None
     rule: Rule = field(default=FRICTION_RULE, kw_only=True, metadata=SHOWN_IF_GIVEN)
     pairs: tuple[Pair, ...] = field(default=(), kw_only=True, metadata=SHOWN_IF_GIVEN)
+    body_axes: tuple[BodyAxis, ...] = field(default=(), kw_only=True, metadata=SHOWN_IF_GIVEN)
 
     if TYPE_CHECKING:
 
@@ -173,6 +178,7 @@ class Friction(Effect):
             *,
             rule: Rule = "geometric_mean",
             pairs: Mapping[tuple[End, End], float] | Iterable[Sequence[End | float]] = (),
+            body_axes: Mapping[End, ArrayLike] | Iterable[Sequence[Any]] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -190,6 +196,9 @@ class Friction(Effect):
         checked_rule(self.rule, "Friction.rule")
         pairs = checked_pairs(self.pairs, "Friction.pairs", validation.non_negative)
         object.__setattr__(self, "pairs", pairs)
+        object.__setattr__(self, "body_axes", checked_axes(self.body_axes))
+        if is_even and self.body_axes:
+            raise ValueError(f"Friction.body_axes is {shown(self.body_axes)}; allowed with one coefficient is none")
 
     __repr__ = fields_repr
     _repr_html_ = fields_table
@@ -235,9 +244,10 @@ class _Resistance(Effect):
 @known_keywords
 @dataclass(frozen=True)
 class RollingFriction(_Resistance):
-    """Rolling resistance of spheres and ellipsoids at walls: a torque of at most ``radius`` times the normal force.
+    """Rolling resistance at contacts of round bodies: a torque of at most ``radius`` times the normal force.
 
-    The torque opposes the component of the angular velocity along the wall; it may stop it, but never reverses it.
+    Spheres, ellipsoids and capsules are round. The torque opposes the component of their angular velocity along the
+    wall or body that they touch, relative to it. It may stop it, but never reverses it.
 
     Parameters
     ----------
@@ -251,7 +261,7 @@ class RollingFriction(_Resistance):
 @known_keywords
 @dataclass(frozen=True)
 class SpinFriction(_Resistance):
-    """Friction of spheres and ellipsoids spinning on a wall: a torque of at most ``radius`` times the normal force.
+    """Friction of round bodies that spin on a wall or body: a torque of at most ``radius`` times the normal force.
 
     The torque opposes the component of the angular velocity along the wall's normal; it may stop it, but never reverses
     it.

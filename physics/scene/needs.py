@@ -54,12 +54,14 @@ class Needs:
         Whether a body may have different coefficients at two walls; whether two bodies have others than those of the
         default rules (`physics.scene.materials`).
     lone : bool
-        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound. Also whether it is a
+        Whether exactly one body moves, and it can touch fixed bodies, none of them a compound; or it is `grained`, or a
         cylinder that can touch walls.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
         Numbers of a body for its prescribed motion; 0 if no body has one.
+    grained : bool
+        Whether bodies have axes of friction of their own, which turn with them.
     linked : bool
         Whether springs tie bodies together.
     kinds : frozenset of str
@@ -94,6 +96,7 @@ class Needs:
     lone: bool
     grouped: bool
     motion_columns: int
+    grained: bool
     linked: bool
     kinds: frozenset[str]
     features: int
@@ -130,8 +133,8 @@ class Needs:
         return self.touching and "compound" in self.kinds
 
 
-def _is_lone(moving: int, kinds: frozenset[str], touching: bool, at_fixed: bool) -> bool:
-    return moving == 1 and "compound" not in kinds and (at_fixed or (touching and "cylinder" in kinds))
+def _is_lone(moving: int, kinds: frozenset[str], touching: bool, is_coupled: bool) -> bool:
+    return moving == 1 and "compound" not in kinds and (is_coupled or (touching and "cylinder" in kinds))
 
 
 def is_isotropic(moments: np.ndarray) -> Any:
@@ -156,6 +159,7 @@ def find_needs(scene: Scene) -> Needs:
     motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
     fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
+    grained = touching and friction is not None and bool(friction.body_axes)
     return Needs(
         contact, friction, gravity, touching, meeting, fixed,
         rubbing=touching and friction is not None,
@@ -163,9 +167,10 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
-        lone=_is_lone(len(axes), kinds, touching, meeting and fixed),
+        lone=_is_lone(len(axes), kinds, touching, (meeting and fixed) or grained),
         grouped=grouped,
         motion_columns=motion_columns,
+        grained=grained,
         linked=any(slot.term.is_linked for slot in fields),
         kinds=kinds,
         features=VERTEX_COUNT if "block" in kinds else 1,

@@ -16,6 +16,7 @@ from physics.annotations import Effect, Vector
 from physics.html_table import fields_table, parts_table, table
 from physics.keywords import known_keywords
 from physics.scene.bodies import Block, Body, Ellipsoid, Hull, Sphere, check_coefficients, check_name
+from physics.scene.body_axes import axis_table
 from physics.scene.capsule import Capsule
 from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder
@@ -234,7 +235,10 @@ class Scene:
 
     def _check_axes(self) -> None:
         friction = self.effect(Friction)
-        if friction is None or friction.axis is None or not self.walls:
+        if friction is None or friction.axis is None:
+            return
+        axis_table(self, friction.body_axes)
+        if not self.walls:
             return
         axes = np.array(friction.axis)
         if axes.ndim == 2 and len(axes) != len(self.walls):

@@ -80,9 +80,9 @@ def _add_forces(indices, memory, out):
                     out[n, b, j] -= force
 
 
-def contact_capacity(memory: np.ndarray) -> int:
-    """Number of contacts for which a row of this memory has room."""
-    return (memory.shape[1] - many.WARM_HEADER_SIZE) // many.WARM_CONTACT_SIZE
+def contact_capacity(memory: np.ndarray, laws: tuple[str, ...] = ()) -> int:
+    """Number of contacts for which a row of this memory has room, in a scene with these contact laws."""
+    return (memory.shape[1] - many.WARM_HEADER_SIZE) // allocation.warm_contact_size(laws)
 
 
 class BodyMemory(ContactMemory):
@@ -100,13 +100,15 @@ class BodyMemory(ContactMemory):
 
     def shape(self, scene: Scene, switches: Any, worlds: int) -> tuple[int, int]:
         parts, walls = part_count(scene.bodies), len(scene.walls)
-        return worlds, allocation.warm_start_size(parts, walls, polyhedra(scene.bodies), self._keeps_part)
+        return worlds, allocation.warm_start_size(
+            parts, walls, polyhedra(scene.bodies), self._keeps_part, switches.laws
+        )
 
     def rows_per_world(self, bodies: int) -> int:
         return 1
 
     def is_valid(self, worlds: Any, memory: np.ndarray) -> bool:
-        room, counts = contact_capacity(memory), memory[:, many.WARM_CONTACT_COUNT]
+        room, counts = contact_capacity(memory, worlds.plan.laws), memory[:, many.WARM_CONTACT_COUNT]
         if not are_indices(counts, room + 1):
             return False
         rows = memory[:, many.WARM_HEADER_SIZE :][:, : room * many.WARM_CONTACT_SIZE].reshape(len(memory), room, -1)
@@ -120,7 +122,7 @@ class BodyMemory(ContactMemory):
         )
 
     def room(self, worlds: Any) -> int:
-        return contact_capacity(worlds.memory)
+        return contact_capacity(worlds.memory, worlds.plan.laws)
 
     def count(self, worlds: Any, index: int) -> int:
         return int(worlds.memory[index, many.WARM_CONTACT_COUNT])

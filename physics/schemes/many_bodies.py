@@ -9,14 +9,17 @@ import numpy as np
 
 from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
 from physics.kernels.multibody.data import allocation
+from physics.kernels.multibody.data.arrays import Grain
 from physics.kernels.multibody.stepping.adaptive_substep import (
     LONE_RELATIVE_SLOP,
     MIN_RELATIVE_SLOP,
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL
 from physics.kernels.state.groups import MultibodySwitches
-from physics.scene.effects import Contact
+from physics.scene.body_axes import axis_table
+from physics.scene.effects import Contact, Friction
 from physics.scene.groups import group_table
 from physics.scene.needs import Needs
 from physics.scene.parts import part_count, part_list
@@ -27,6 +30,12 @@ from physics.schemes.body_memory import BodyMemory
 from physics.schemes.material_tables import pair_materials, wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
+_OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
+"""Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
+
+KNOWN_LAWS = _OF_STAGES | {LAW_TANGENTIAL, LAW_ANISOTROPY}
+"""Contact laws that this scheme supports."""
+
 
 def _meetings(scene: Scene, switches: Switches) -> int:
     """Code of the setting `meet`: 0 if no bodies touch each other, 1 if all may, 2 if only a moving and a fixed one."""
@@ -34,6 +43,16 @@ def _meetings(scene: Scene, switches: Switches) -> int:
     if contact is None or not switches.meeting:
         return 0
     return 1 if contact.between_bodies else 2
+
+
+def _grain(scene: Scene, switches: Switches) -> Grain | None:
+    """Axes of friction with two coefficients; None with one coefficient."""
+    friction: Any = scene.effect(Friction)
+    if LAW_ANISOTROPY not in switches.laws:
+        return None
+    axis = np.array(friction.axis)
+    axis = axis / np.linalg.norm(axis) if axis.ndim == 1 else np.zeros(3)
+    return Grain(axis, axis_table(scene, friction.body_axes))
 
 
 class ManyBodies(Scheme):
@@ -58,18 +77,15 @@ class ManyBodies(Scheme):
         is_precise = INTEGRATORS[accuracy.scheme] == EVENTS
         is_coupled = needs.meeting or needs.linked or needs.hulls or needs.capsules or needs.grouped
         is_coupled = is_coupled or needs.compounds or needs.cylinders
+        is_coupled = is_coupled or needs.grained or (is_precise and bool(_OF_STAGES & set(needs.laws)))
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_cylinders(scene, needs)
-        if not found and self.is_error_controlled:
-            found = objections.to_laws_of_stages(needs)
-        if not found and (names := objections.declared_laws(needs)):
-            found = (
-                f"Scene.effects holds {names}, which act between a body and a wall; allowed are scenes of one body, or "
-                "with Contact(between_bodies=False), without hulls, capsules, cylinders, compounds, fixed bodies, "
-                "groups that keep some bodies from some walls, and Spring between bodies"
-            )
+        if self.is_error_controlled:
+            found = found or objections.to_laws_of_stages(needs)
+        found = found or objections.to_laws_at_walls(scene, needs, KNOWN_LAWS)
+        found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
@@ -83,7 +99,9 @@ class ManyBodies(Scheme):
             capsules=switches.capsules, cylinders=switches.cylinders,
             parts=part_list(scene.bodies) if switches.compounds else (),
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
-            motion_columns=switches.motion_columns, lone=switches.lone, meet=_meetings(scene, switches),
+            motion_columns=switches.motion_columns, laws=switches.laws, grain=_grain(scene, switches),
+            lone=switches.lone,
+            meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
         )  # fmt: skip
@@ -93,7 +111,7 @@ class ManyBodies(Scheme):
         if not self.is_error_controlled:
             return None
         bodies, parts, walls = len(scene.bodies), part_count(scene.bodies), len(scene.walls)
-        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies))
+        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies), laws=switches.laws)
         return allocation.make_snapshots(bodies, memory, switches.lone)
 
     def acting(self, accuracy: Accuracy) -> Accuracy:

@@ -12,6 +12,7 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_STIFFNESS,
     LAW_TANGENTIAL,
 )
+from physics.scene.body_axes import axis_table
 from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
 from physics.scene.parts import with_parts
@@ -23,19 +24,33 @@ DECLARED = {
 }  # fmt: skip
 """Names of the effects or fields that declare each contact law."""
 
-_OF_STAGES = (LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS)
+_OF_STAGES = (LAW_STIFFNESS,)
 
 
-def declared_laws(needs: Needs) -> str:
-    """Names of the effects or fields with which a scene declares contact laws, joined by commas."""
-    return ", ".join(DECLARED[law] for law in needs.laws if law in DECLARED)
+def to_laws_at_walls(scene: Scene, needs: Needs, known: frozenset[str]) -> str:
+    """Message against contact laws that act at walls only, for a scheme with `known` others; "" if there are none."""
+    names = ", ".join(DECLARED[law] for law in needs.laws if law in DECLARED and law not in known)
+    if not names:
+        return ""
+    return f"Scene.effects holds {names}, known at walls only, and {_coupling(scene, needs)}"
+
+
+def _coupling(scene: Scene, needs: Needs) -> str:
+    """Reason why the bodies of a scene have one contact problem, and what would part them."""
+    for b, body in enumerate(scene.bodies):
+        if body.fixed:
+            return f"Scene.bodies[{b}] is fixed; allowed is a HalfSpace in its place"
+        if body.kind in ("hull", "capsule", "cylinder", "compound"):
+            return f"Scene.bodies[{b}] is a {body.kind}; allowed are blocks, spheres and ellipsoids"
+    if needs.meeting:
+        return "bodies may touch each other; allowed is Contact(between_bodies=False)"
+    if needs.grouped:
+        return "groups keep bodies from walls; allowed are masks with which all bodies touch all walls"
+    return "a Spring ties bodies to each other; allowed are anchors in the world"
 
 
 def to_laws_of_stages(needs: Needs) -> str:
-    """Message against contact laws that act over a stage of time stepping; "" if the scene has none.
-
-    These are rolling friction, spin friction and stiffness.
-    """
+    """Message against contact laws that act over a stage of time stepping only; "" if the scene has none."""
     unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
     if unknown:
         return (
@@ -58,10 +73,26 @@ def to_sleeping(needs: Needs) -> str:
 def to_tangential(scene: Scene, needs: Needs) -> str:
     """Message against tangential restitution in a scene with bodies other than spheres; "" if there is no conflict."""
     for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in needs.laws else ()):
-        if body.kind != "sphere":
+        if body.kind != "sphere" and not body.fixed:
             return (
                 f"Contact.tangential is {needs.contact.tangential}, but Scene.bodies[{b}] is a {body.kind}; allowed "
-                "where every body is a sphere: of others it would not say how an impact ends"
+                "where every body that moves is a sphere: of others it would not say how an impact ends"
+            )
+    return ""
+
+
+def to_axes_of_walls(scene: Scene, needs: Needs) -> str:
+    """Message against axes of friction for each wall where bodies touch each other; "" if there is no conflict.
+
+    Bodies with axes of their own need no other one.
+    """
+    if LAW_ANISOTROPY not in needs.laws or not needs.meeting or np.ndim(needs.friction.axis) == 1:
+        return ""
+    for b, has_axis in enumerate(axis_table(scene, needs.friction.body_axes).any(axis=1)):
+        if not has_axis:
+            return (
+                f"Friction.axis has a direction for each wall, and Scene.bodies[{b}] may touch other bodies; allowed "
+                "is one direction for all contacts, or one of Friction.body_axes for this body"
             )
     return ""
 
@@ -80,7 +111,17 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against a cylinder that may touch another body than a sphere; "" if none can."""
+    """Message against a cylinder that may touch another body than a sphere, or has a torque of `RollingFriction`.
+
+    "" if there is neither.
+    """
+    for b, body in enumerate(scene.bodies if {LAW_ROLLING, LAW_SPIN} & set(needs.laws) else ()):
+        if not body.fixed and any(part.kind == "cylinder" for part in with_parts([body])):
+            return (
+                f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in needs.laws else LAW_SPIN]}, but "
+                f"Scene.bodies[{b}] is or holds a cylinder, whose faces do not roll; allowed are spheres, "
+                "ellipsoids and capsules beside bodies without round parts"
+            )
     if not (needs.meeting and needs.cylinders):
         return ""
     between = needs.contact.between_bodies

@@ -47,7 +47,7 @@ def fill(world: Batch) -> None:
     parameters.write_bodies(world.params, scene.bodies)
     materials.write_materials(world.params, scene, plan)
     world.gravity[:] = gravity.acceleration if gravity else 0.0
-    parameters.write_laws(world.params, plan.laws, scene.effects)
+    parameters.write_laws(world.params, plan, scene.effects)
     columns = world.params[:, at.PARAM_SIZE :]
     write_columns(plan.fields, columns, world.body_count, np.arange(world.worlds))
     motions.write_scene_motions(scene, plan, world.state, world.params, 0.0)

@@ -19,6 +19,7 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_TANGENTIAL,
 )
 from physics.mass.inertia import check_inertia, check_range, principal_axes
+from physics.plan.plan import Plan
 from physics.scene.bodies import Body
 from physics.scene.effects import Contact, Friction, RollingFriction, SpinFriction
 from physics.scene.scene import HalfSpace
@@ -78,13 +79,18 @@ LAW_EFFECTS = {
 }
 
 
-def write_laws(params: np.ndarray, laws: tuple[str, ...], effects: Sequence) -> None:
-    """Write the number of each contact law, found among `effects`, into its column: the last columns of `params`."""
-    for k, law in enumerate(laws):
+def law_column(params: np.ndarray, plan: Plan, law: str) -> int:
+    """Column of a contact law in `params`: the laws' columns are before those of motions, which are the last ones."""
+    return params.shape[1] - plan.motion_columns - len(plan.laws) + plan.laws.index(law)
+
+
+def write_laws(params: np.ndarray, plan: Plan, effects: Sequence) -> None:
+    """Write the number of each contact law of the plan, found among `effects`, into its column of `params`."""
+    for law in plan.laws:
         kind, name = LAW_EFFECTS[law]
         for effect in effects:
             if isinstance(effect, kind):
-                params[:, params.shape[1] - len(laws) + k] = getattr(effect, name)
+                params[:, law_column(params, plan, law)] = getattr(effect, name)
 
 
 def _write_series(params: np.ndarray) -> None:

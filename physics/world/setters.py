@@ -197,7 +197,7 @@ def _write_effects(world: Batch, chosen, params, effects) -> None:
         if isinstance(effect, Friction):
             _check_settings(effect, world.scene.effect(Friction))
             materials.write_scene_friction(params, world.scene, effect)
-    parameters.write_laws(params, world.plan.laws, laws)
+    parameters.write_laws(params, world.plan, laws)
     fields = [effect for effect in effects if effect not in laws]
     write_columns(_changed_slots(world, fields), params[:, at.PARAM_SIZE :], world.body_count, chosen)
 
@@ -315,7 +315,7 @@ def _needs(field: str, is_on, effect: str) -> None:
 
 def _check_settings(friction: Friction, declared: Friction) -> None:
     """Refuse a `Friction` that differs from the scene's in a setting that all worlds share."""
-    for name in ("axis", "rule", "pairs"):
+    for name in ("axis", "rule", "pairs", "body_axes"):
         given, own = getattr(friction, name), getattr(declared, name)
         if given != own:
             raise ValueError(

@@ -249,10 +249,6 @@ BAD = [
     (lambda: physics.Friction((0.1, 0.2), (1, [2])), "Friction.axis is .*; allowed are numbers"),
     (lambda: on([FLOOR], physics.Friction((0.1, 0.2), (0, -2, 0))), r"Friction.axis is .* the normal of walls\[0\]"),
     (lambda: on([FLOOR], physics.Friction((0.1, 0.2), (Z, Z))), "Friction.axis has 2 directions; allowed are one"),
-    (
-        lambda: on([FLOOR], physics.Friction((0.1, 0.2), Z), [slab(), slab(pos=(3, 1, 0))]),
-        "holds Friction with two coefficients, which act between a body and a wall; allowed are scenes of one body",
-    ),
 ]
 
 

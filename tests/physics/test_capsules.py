@@ -447,9 +447,6 @@ def test_effects_that_capsules_cannot_have_are_refused_by_name():
     capsule = physics.Capsule(0.1, 0.6, 1.0)
     with pytest.raises(ValueError, match=r"holds Drag, and Scene.bodies\[0\] is a capsule"):
         physics.Scene(capsule, effects=physics.Drag())
-    for law in (physics.RollingFriction(0.01), physics.SpinFriction(0.01)):
-        with pytest.raises(ValueError, match=rf"{type(law).__name__}, which act .* without hulls, capsules"):
-            physics.World(physics.Scene(capsule, [FLOOR], [physics.Contact(), physics.Friction(0.5), law]))
 
 
 def test_a_plan_says_what_capsules_need():

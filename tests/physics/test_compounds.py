@@ -461,10 +461,6 @@ REFUSED = {
     "a fixed part": (lambda: physics.Compound([physics.Sphere(1.0, fixed=True)]), r"parts\[0\]\.fixed is True"),
     "density": (lambda: physics.Compound(dumbbell().parts, density=2.0), "density is 2.0 of a Compound"),
     "drag": (lambda: physics.Scene([dumbbell()], effects=[physics.Drag()]), r"Drag, and Scene.bodies\[0\] is a compo"),
-    "rolling friction": (
-        lambda: world_of(dumbbell(pos=(0, 1, 0)), laws=[*effects(), physics.RollingFriction(0.1)]),
-        "RollingFriction",
-    ),
     "size": (
         lambda: world_of(dumbbell(pos=(0, 1, 0))).set_parameters(size=(1, 1, 1)),
         r"Scene.bodies\[0\], a compound, which has its parts in all worlds",

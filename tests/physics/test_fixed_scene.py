@@ -63,10 +63,6 @@ BAD = [
         lambda: with_effect(physics.Spring(body=1, other=0, anchor=(1, 0.5, 0))),
         r"Spring.other is 0, a fixed body; .* anchor in the world: anchor=\(1.0, 0.0, 0.0\)",
     ),
-    (
-        lambda: physics.World(with_effect(physics.RollingFriction())),
-        "RollingFriction.*without hulls, capsules, cylinders, compounds, fixed bodies",
-    ),
 ]
 
 

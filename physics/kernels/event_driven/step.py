@@ -297,7 +297,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, sc
             ev.note_mode_change(records.log, records.counts, i, 0.0, ev.KIND_FAULT, -1)
             continue
         bind_fields(bodies.params, i, None, body)
-        bind_laws(bodies.params, i, body)
+        bind_laws(bodies.params, i, bodies.params.shape[1], body)
         bind_materials(bodies.params, i, body)
         y = read_state(bodies.state, i)
         for k in range(grid.steps * grid.substeps):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from physics.compiler.decorators import backend, by_type, members, when
 
-# Names of the laws. Coefficients of declared laws are in this order in `body.laws` and in the last columns of `params`.
+# Names of the laws. Coefficients of declared laws are in this order in `body.laws` and in `params`.
 LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY = "tangential", "rolling", "spin", "anisotropy"
 LAW_STIFFNESS, LAW_DAMPING = "stiffness", "damping"
 LAWS = (LAW_TANGENTIAL, LAW_ROLLING, LAW_SPIN, LAW_ANISOTROPY, LAW_STIFFNESS, LAW_DAMPING)
@@ -54,13 +54,13 @@ def law_parameter(law: str, otherwise: float = 0.0):
     return by_type(chosen)
 
 
-def _nothing(params, i, body):
+def _nothing(params, i, end, body):
     return None
 
 
 @if_law(LAWS, _nothing)
-def bind_laws(params, i, body):
-    """Copy the laws' coefficients of row i of `params`, its last columns, into the record `body`."""
+def bind_laws(params, i, end, body):
+    """Copy the laws' coefficients of row i of `params`, its columns up to `end`, into the record `body`."""
     count = body.laws.shape[0]
     for k in range(count):
-        body.laws[k] = params[i, params.shape[1] - count + k]
+        body.laws[k] = params[i, end - count + k]

@@ -318,7 +318,7 @@ def advance_world(world, grid, bodies, contact, restitution, flight, sleep, reco
             report_fault(world, b, records.report)
             continue
         bind_fields(bodies.params, i, flight.scheme, body)
-        bind_laws(bodies.params, i, body)
+        bind_laws(bodies.params, i, bodies.params.shape[1], body)
         bind_materials(bodies.params, i, body)
         y, clear = read_state(bodies.state, i), 0
         for k in range(end):

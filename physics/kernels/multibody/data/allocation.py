@@ -23,6 +23,8 @@ from physics.kernels.multibody.data.arrays import (
     PAIR_CONTACTS,
     PAIRS_PER_BODY,
     RATE_SIZE,
+    TORQUE_HISTORY,
+    TORQUE_SIZE,
     VISIT_SIZE,
     WARM_CONTACT_SIZE,
     WARM_HEADER_SIZE,
@@ -37,12 +39,14 @@ from physics.kernels.multibody.data.arrays import (
     NarrowPhase,
     Newton,
     PairMaterials,
+    Resistance,
     StageStart,
     Sweeps,
     WorldSnapshots,
 )
 from physics.kernels.multibody.data.hull_tables import clipped_face_capacity, make_hulls
 from physics.kernels.multibody.data.parts import ActingBodies, Part, make_parts, write_part_records
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
@@ -91,13 +95,25 @@ def batch_capacity(bodies: int, contacts: int) -> int:
     return max(1, min(contacts, BATCHES_PER_BODY * bodies))
 
 
-def warm_start_size(bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False) -> int:
+def warm_start_size(
+    bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False, laws: tuple[str, ...] = ()
+) -> int:
     """Number of columns of a world's row of `memory`, the warm start (`arrays.WARM_CONTACT_ID`, ...).
 
     `bodies` and `polyhedra` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps
-    one number more.
+    one number more. `laws` are those of the scene: rolling and spin friction keep a torque for each contact.
     """
-    return WARM_HEADER_SIZE + WARM_CONTACT_SIZE * contact_capacity(bodies, walls, polyhedra) + int(refined)
+    return WARM_HEADER_SIZE + warm_contact_size(laws) * contact_capacity(bodies, walls, polyhedra) + int(refined)
+
+
+def warm_contact_size(laws: tuple[str, ...] = ()) -> int:
+    """Number of columns of `memory` for each contact, its torque included, in a scene with these laws."""
+    return WARM_CONTACT_SIZE + TORQUE_SIZE * has_torques(laws)
+
+
+def has_torques(laws: tuple[str, ...]) -> bool:
+    """True if rolling or spin friction is among the laws."""
+    return LAW_ROLLING in laws or LAW_SPIN in laws
 
 
 def make_bodies_workspace(
@@ -139,6 +155,10 @@ def make_bodies_workspace(
         bodies, None: the default rules.
     motion_columns : int
         Columns of a prescribed motion (`flight.prescribed_motion`); 0: no body has one.
+    laws : tuple of str
+        Contact laws of the scene (`state.contact_law_dispatch.LAWS`), which add fields to the record of a body.
+    grain : Grain or None
+        Axes of friction with two coefficients; None: it has one coefficient.
     lone : True or None
         Whether exactly one body moves, and it can touch fixed bodies.
     settings : float
@@ -148,7 +168,9 @@ def make_bodies_workspace(
     parts, capsules, cylinders = (settings.pop(name, None) for name in ("parts", "capsules", "cylinders"))
     parts = parts or ()
     contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra)
-    made = _make_bodies(bodies, terms, materials[0], settings.pop("relative_slop"), fixed, groups, parts)
+    laws = settings.pop("laws", ())
+    fields = body_fields(terms, laws, materials[0])
+    made = _make_bodies(bodies, fields, materials[0], settings.pop("relative_slop"), fixed, groups, parts)
     acting = ActingBodies(made.body[:bodies], made.state, made.touched, made.fixed)
     return BodiesWorkspace(
         bodies=made._replace(capsules=capsules, cylinders=cylinders, parts=make_parts(bodies, parts, contacts, acting)),
@@ -163,6 +185,8 @@ def make_bodies_workspace(
         materials=materials[1],
         driven=_make_driven(bodies, contacts, motion_columns),
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
+        resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
+        grain=settings.pop("grain", None),
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )
@@ -170,14 +194,14 @@ def make_bodies_workspace(
 
 def _make_bodies(
     bodies: int,
-    terms: tuple[Term, ...],
+    fields: list[tuple],
     materials: WallMaterials | None,
     relative_slop: float,
     fixed: np.ndarray | None,
     groups: np.ndarray | None,
     parts: Sequence[Part],
 ) -> Bodies:
-    records = np.zeros(bodies + len(parts), np.dtype(body_fields(terms, materials=materials)))
+    records = np.zeros(bodies + len(parts), np.dtype(fields))
     records["relative_slop"] = relative_slop
     write_part_records(records, bodies, parts)
     if materials is not None:
@@ -331,6 +355,23 @@ def _make_lone(contacts: int) -> LoneBody:
         impacts=np.zeros(1, i),
         slow=np.zeros(1, i),
         suspect=np.zeros(1, i),
+    )
+
+
+def _make_resistance(bodies: int, contacts: int) -> Resistance:
+    i = np.int64
+    return Resistance(
+        torque=np.zeros((contacts, 3)),
+        error=np.zeros((contacts, 3)),
+        answer=np.zeros(contacts),
+        push=np.zeros(contacts),
+        count=np.zeros(bodies, i),
+        loaded=np.zeros((bodies, 6)),
+        torque_change=np.zeros((TORQUE_HISTORY + 1, contacts, 3)),
+        error_change=np.zeros((TORQUE_HISTORY + 1, contacts, 3)),
+        equations=np.zeros((TORQUE_HISTORY, TORQUE_HISTORY + 1)),
+        share=np.zeros(TORQUE_HISTORY),
+        order=np.zeros(TORQUE_HISTORY, i),
     )
 
 

@@ -51,6 +51,9 @@ BLOCKS_PER_BODY = 32
 # method.
 BATCHES_PER_BODY = 32
 
+# Earlier torques that Anderson's method combines in `solver.resistance_torques`.
+TORQUE_HISTORY = 10
+
 # Entries of `counts`: contacts; near pairs; contacts or pairs without room; batches of the island that is solved;
 # contacts of two bodies that would stop them (`contact_set.is_stopping`).
 NUM_CONTACTS, NUM_PAIRS, NUM_DROPPED, NUM_BATCHES, NUM_STOPPING = range(5)
@@ -76,6 +79,9 @@ WARM_STAGE_LENGTH, WARM_CONTACT_COUNT = range(2)
 WARM_HEADER_SIZE = 2
 WARM_CONTACT_ID, WARM_BODY_A, WARM_BODY_B, WARM_IMPULSE, WARM_POINT = 0, 1, 2, 3, 6
 WARM_CONTACT_SIZE = 9
+
+# Numbers of a torque, which is behind all contacts of a row of `memory` (`warm_torques`).
+TORQUE_SIZE = 3
 
 
 # Numbers in a row of `WorldSnapshots.rates`: acceleration [m/s²], rate of the angular momentum [N m].
@@ -257,6 +263,29 @@ class LoneBody(NamedTuple):
     suspect: np.ndarray  # (1,) int, place in the substep up to which a sudden change may be (`stepping.lone_part`)
 
 
+class Resistance(NamedTuple):
+    """Scratch of `solver.resistance_torques`: torques at the contacts of round bodies."""
+
+    torque: np.ndarray  # (contacts, 3) angular impulse on the first body, world frame [kg m²/s]
+    error: np.ndarray  # (contacts, 3) error of the torque, G(T) - T
+    answer: np.ndarray  # (contacts,) 1/ρ [1/(kg m²)]; 0: no torque at this contact
+    push: np.ndarray  # (contacts,) normal impulse that limits the torque [N s]
+    count: np.ndarray  # (bodies,) int, contacts of each body with a torque
+    loaded: np.ndarray  # (bodies, 6) twists without impulses and torques [m/s, rad/s]
+    torque_change: np.ndarray  # (history + 1, contacts, 3) changes between solves; the last row: the latest torques
+    error_change: np.ndarray  # (history + 1, contacts, 3) the same of errors
+    equations: np.ndarray  # (history, history + 1) normal equations, right sides in the last column
+    share: np.ndarray  # (history,) their solution
+    order: np.ndarray  # (history,) int, scratch
+
+
+class Grain(NamedTuple):
+    """Axes of friction with two coefficients, see `grain`."""
+
+    axis: np.ndarray  # (3,) unit vector or 0, of two bodies without an axis of their own, world frame
+    body_axis: np.ndarray  # (bodies, 3) unit vectors, or 0 for bodies without an axis, body frames
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -272,5 +301,7 @@ class BodiesWorkspace(NamedTuple):
     materials: PairMaterials | None  # None: the default rules, and no exceptions
     driven: DrivenBodies | None  # None: the scene declares no motion
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
+    resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
+    grain: Grain | None  # None: the scene has no friction with two coefficients
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

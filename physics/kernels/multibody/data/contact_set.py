@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.cylinder_balls import normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rim_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
+from physics.kernels.multibody.data.grain import grain_tangents
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.multibody.data.parts import (
     body_of,
@@ -94,13 +95,14 @@ def tangent_basis(n):
 def write_contact_frame(k, n, many):
     """Write the frame (normal, two tangents) of contact k, for its unit normal n in the world frame.
 
-    If contact k - 1 has the same normal, its tangents are copied.
+    If contact k - 1 has the same normal, its tangents are copied. Those along axes of friction are in `grain`.
     """
     frame = many.contacts.frame
     if k > 0 and n == row_vector(frame, k - 1, 0):
         t1, t2 = row_vector(frame, k - 1, 3), row_vector(frame, k - 1, 6)
     else:
         t1, t2 = tangent_basis(n)
+    t1, t2 = grain_tangents(k, n, t1, t2, many)
     put_vector(frame, k, 0, n)
     put_vector(frame, k, 3, t1)
     put_vector(frame, k, 6, t2)
@@ -405,6 +407,12 @@ def _carried_point(b, k, first, side, n, many):
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 
 
+@if_given("many.grain")
+def turn_grain(k, n, many):
+    """Write the frame of contact k anew for its unchanged normal n, since axes of friction turn with their bodies."""
+    write_contact_frame(k, n, many)
+
+
 @inlined
 def _turn_frame(k, a, b, many):
     """Update the frame of contact k for the present poses of its parts a and b; return its normal, world frame.
@@ -428,6 +436,8 @@ def _turn_frame(k, a, b, many):
     elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
         n = normal_beside_cylinder(k, a, b, n, many)
         write_contact_frame(k, n, many)
+    else:
+        turn_grain(k, n, many)
     return n
 
 

@@ -52,6 +52,16 @@ def moving_body_at(end, many):
     return b if b >= 0 and (end >= 0 or is_driven(b, many)) else end
 
 
+def _end_of_columns(params, many):
+    return params.shape[1]
+
+
+@if_given("many.driven", _end_of_columns)
+def motion_column(params, many):
+    """First column of motions in `params`, which are the last ones; the end of the columns if no body has a motion."""
+    return params.shape[1] - many.driven.columns.shape[1]
+
+
 @if_given("many.driven")
 def bind_motions(params, first, many):
     """Copy the motions of a world's bodies from `params`, whose rows for this world begin at row `first`."""

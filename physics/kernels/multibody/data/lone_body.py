@@ -1,4 +1,4 @@
-"""The only moving body of a world with fixed bodies, the lone body, and whether it is slow in a stage."""
+"""The lone body of a world, the only one that moves among fixed ones or with an axis of friction; its slowness."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SLOW_SHARE = 0.1
 
 @inlined
 def lone_body(many):
-    """Index of the first body that moves; only for a scene with fixed bodies."""
+    """Index of the first body that moves."""
     b = 0
     while is_fixed(b, many.bodies):
         b += 1

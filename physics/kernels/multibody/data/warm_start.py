@@ -25,7 +25,9 @@ from physics.kernels.multibody.data.clipped_points import copy_follow
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix
 from physics.kernels.multibody.data.driven_bodies import copy_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import shown_end
+from physics.kernels.multibody.data.grain import less_stretch
 from physics.kernels.multibody.data.parts import copy_parts
+from physics.kernels.multibody.data.warm_torques import load_warm_torque, move_warm_torque, store_warm_torque
 from physics.kernels.state.sleeping import is_asleep
 
 
@@ -93,13 +95,13 @@ def load_warm_impulses(n, world, h, friction, memory, many):
         p = (0.0, 0.0, 0.0)
         found = _find_remembered(many.contacts.id[k], world, memory, table)
         if found >= 0:
-            x, y, z = qt.matvec(
-                row_matrix(many.contacts.frame, k), row_vector(memory, world, _contact_column(found) + WARM_IMPULSE)
-            )
+            p = row_vector(memory, world, _contact_column(found) + WARM_IMPULSE)
+            x, y, z = less_stretch(k, qt.matvec(row_matrix(many.contacts.frame, k), p), many)
             p = (scale * max(x, 0.0), 0.0, 0.0)
             if friction is not None:
                 p = (p[0], scale * y, scale * z)
         put_vector(many.contacts.impulse, k, 0, p)
+        load_warm_torque(k, found, scale, world, memory, many)
     _clear_ids(world, memory, table)
 
 
@@ -119,6 +121,7 @@ def _keep_sleeping(world, h, sleep, memory, many):
                 memory[world, to + c] = memory[world, row + c]
             for c in range(3):
                 memory[world, to + WARM_IMPULSE + c] *= h / length
+            move_warm_torque(k, count, h / length, world, memory, many)
             count += 1
     return count
 
@@ -141,6 +144,7 @@ def store_warm_impulses(n, world, h, sleep, memory, many):
         )
         p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         put_vector(memory, world, row + WARM_IMPULSE, p)
+        store_warm_torque(k, before + k, world, memory, many)
         put_vector(
             memory,
             world,

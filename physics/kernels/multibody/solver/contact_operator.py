@@ -16,6 +16,7 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, contact_velocity, put_vector, row_matrix
+from physics.kernels.multibody.data.grain import stretched_inv_mass
 
 
 @inlined
@@ -62,7 +63,8 @@ def apply_world_impulse(k, p, t, many):
 def _add_mobility(k, b, first, W, many):
     """Sum of W and the mobility of body b at contact k: 1/m δ_ij + (r x e_i)·I⁻¹ (r x e_j) [1/kg].
 
-    r is the arm of b (its first column is `first`), e_i are the axes of the contact frame. W and the result are the
+    r is the arm of b (its first column is `first`), e_i are the axes of the contact frame, of which the last one may be
+    longer than 1 (`grain`); 1/m is multiplied by its square then. W and the result are the
     upper triangle (00, 01, 02, 11, 12, 22) of a symmetric matrix.
     """
     r, E = row_vector(many.contacts.arm, k, first), many.contacts.frame
@@ -75,7 +77,7 @@ def _add_mobility(k, b, first, W, many):
     m = many.bodies.inv_mass[b]
     return (
         W[0] + (m + qt.dot(g0, h0)), W[1] + qt.dot(g0, h1), W[2] + qt.dot(g0, h2),
-        W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (m + qt.dot(g2, h2)),
+        W[3] + (m + qt.dot(g1, h1)), W[4] + qt.dot(g1, h2), W[5] + (stretched_inv_mass(k, m, many) + qt.dot(g2, h2)),
     )  # fmt: skip
 
 

@@ -17,6 +17,8 @@ from physics.kernels.multibody.data.contact_set import (
     relative_acceleration_bound,
     smaller_radius,
 )
+from physics.kernels.multibody.data.warm_torques import clear_torque
+from physics.kernels.multibody.stepping.bouncing import is_bouncing, rest_speed_limit, set_tangential_targets
 from physics.kernels.multibody.stepping.impact_events import log_impacts
 from physics.kernels.multibody.stepping.restitution_energy import apply_impact_within_energy
 from physics.kernels.multibody.stepping.sudden_change import count_impact
@@ -27,10 +29,6 @@ _FAST_RADIUS_SHARE = 0.1
 
 # Factor of the bound ω² r of a point's acceleration by free rotation, since the angular velocity changes meanwhile.
 TURNING_MARGIN = 2.0
-
-# Depth, in slops, that a body may go in until the resting stage stops it at its middle. This saves the contact problem
-# of an impact.
-_SOFT_LANDING_SLOPS = 100.0
 
 # Gap within which an open contact belongs to an impact of others: in slops, and, if its pair touches elsewhere, in
 # tolerances times the smaller body's radius. A face that comes back from an impact is tilted by the residual of its
@@ -44,37 +42,6 @@ _UNCONSTRAINED = 1.0e300
 # Target of an open contact for which a later stage ends in time, but which pushes on its bodies may close in this one.
 # The resting stage replaces it.
 FORETOLD = -1.0e299
-
-
-@inlined
-def _rest_speed(k, many):
-    """Speed that loads give contact k within `rest_share` of the substep [m/s].
-
-    The whole substep counts, even if little of it is left after another impact; else such impacts would make resting
-    bodies bounce.
-    """
-    return many.settings[0].rest_share * relative_acceleration_bound(k, many) * many.settings[0].substep
-
-
-@inlined
-def is_bouncing(k, many):
-    """True if contact k would rebound from an impact at its present speed.
-
-    A rebound that would be over within `rest_share` of the substep does not count.
-    """
-    bounce = -many.contacts.restitution[k] * many.contacts.speed[k]
-    return many.contacts.restitution[k] > 0.0 and bounce > _rest_speed(k, many)
-
-
-@inlined
-def rest_speed_limit(k, h, many):
-    """Largest approach speed of contact k that a resting stage of length h [s] may stop without an impact [m/s].
-
-    It is the speed that loads give within `rest_share` of the substep, or one that closes a few slops until the middle
-    of the stage, whichever is larger.
-    """
-    slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
-    return max(2.0 * _SOFT_LANDING_SLOPS * slop / h, _rest_speed(k, many))
 
 
 @inlined
@@ -192,6 +159,7 @@ def set_impact_targets(n, h, is_last, many):
             fastest = k
         put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+        clear_torque(k, many)
     if is_impact:
         fastest = _extend_impact(n, h, fastest, many)
     return fastest
@@ -277,6 +245,7 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
             if k != fastest:
                 many.contacts.target[k, 0] = -_UNCONSTRAINED  # resolved after this impact, when the step returns
     n = drop_unconstrained(n, many)
+    set_tangential_targets(n, many, many.bodies.body[0])
     count_impact(many)
     apply_impact_within_energy(n, world, switches.friction, switches.flight.offset_frame, records.report, many)
     if records.log.shape[1] > 0:

@@ -8,6 +8,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector
 from physics.kernels.multibody.data.driven_bodies import driven_work
+from physics.kernels.multibody.stepping.bouncing import aims_along, clear_tangential_target
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
@@ -85,9 +86,10 @@ def _blend_impulses(n, s, many):
 
 @inlined
 def _is_to_rebound(k, many):
-    """True if the target of contact k is a rebound by Newton's law, and not 0."""
+    """True if the target of contact k is a rebound by Newton's law, or one along its plane, and not 0."""
     goal = many.contacts.target[k, 0]
-    return goal != 0.0 and goal == -many.contacts.restitution[k] * many.contacts.speed[k]
+    is_normal = goal != 0.0 and goal == -many.contacts.restitution[k] * many.contacts.speed[k]
+    return is_normal or aims_along(k, many, many.bodies.body[0])
 
 
 @inlined
@@ -97,6 +99,7 @@ def _set_plastic_targets(n, many):
         put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
         if _is_to_rebound(k, many):
             many.contacts.target[k, 0] = 0.0
+        clear_tangential_target(k, many, many.bodies.body[0])
     for b in range(many.bodies.state.shape[0]):
         put_vector(many.bodies.state, b, at.LINVEL, row_vector(many.bodies.momenta, b, _PRE_IMPACT))
         put_vector(many.bodies.state, b, at.ANGMOM, row_vector(many.bodies.momenta, b, _PRE_IMPACT + 3))

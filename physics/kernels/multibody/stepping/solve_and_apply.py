@@ -7,7 +7,8 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import PARTED, add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.multibody.data.driven_bodies import aim_at_driven_ends, aim_at_relative_velocities
-from physics.kernels.multibody.solver.solve import solve_all_frictionless, solve_contacts
+from physics.kernels.multibody.solver.resistance_torques import apply_resistance, solve_with_resistance
+from physics.kernels.multibody.solver.solve import solve_all_frictionless
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import report_solve
 
@@ -69,9 +70,10 @@ def solve_and_apply(n, world, friction, report, many):
     `world` is the index of the world; `friction` is None if the scene has no friction.
     """
     aim_at_driven_ends(n, many)
-    iterations, residual, method = solve_contacts(n, friction, many)
+    iterations, residual, method = solve_with_resistance(n, friction, many)
     aim_at_relative_velocities(n, many)
     apply_impulses(n, many)
+    apply_resistance(n, many)
     report_solve(report, world, residual, iterations, method, many.settings[0].tolerance)
 
 

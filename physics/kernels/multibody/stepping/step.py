@@ -12,7 +12,11 @@ from physics.kernels.contact_law.materials import bind_wall_coefficients
 from physics.kernels.forces.held_loads import bind_fields, set_clock
 from physics.kernels.forces.world_energy_budget import report_unresolved_bodies
 from physics.kernels.multibody.data.contact_set import put_vector
-from physics.kernels.multibody.data.driven_bodies import bind_motions, write_driven_velocities
+from physics.kernels.multibody.data.driven_bodies import (
+    bind_motions,
+    motion_column,
+    write_driven_velocities,
+)
 from physics.kernels.multibody.data.parts import acting_bodies, bind_parts
 from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_asleep, update_sleep, wake_world
 from physics.kernels.multibody.data.warm_start import clear_warm_start
@@ -30,6 +34,7 @@ from physics.kernels.state.body import (
     report_fault,
     write_state,
 )
+from physics.kernels.state.contact_law_dispatch import bind_laws
 from physics.kernels.state.fixed_body import clear_loads, is_fixed
 from physics.kernels.time_stepping.event_log import clear_events, drop_events
 
@@ -77,6 +82,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         many.bodies.inv_mass[b] = params[i, at.INV_MASS]
         bind_fields(params, i, switches.flight.scheme, many.bodies.body[b])
         bind_wall_coefficients(params, i, many.bodies.body[b])
+        bind_laws(params, i, motion_column(params, many), many.bodies.body[b])
         write_state(many.bodies.state, b, read_state(state, i))
         many.bodies.touched[b] = 0
     bind_parts(many)
