@@ -20,7 +20,7 @@ from rigid_env.envs.policy_files import ARRAYS, Network
 from rigid_env.terminal import make_console, run_program
 
 FEATURES = ("FlattenExtractor", GoalDifference.__name__)
-"""What a policy may put before its network, by the name of the class."""
+"""Names of the classes that a policy may put before its network."""
 
 
 def network_of(model: BaseAlgorithm) -> Network:
