@@ -11,7 +11,7 @@ from gymnasium.error import DependencyNotInstalled
 
 from agents.baselines import Policy, baseline_policy
 from agents.evaluate import AccuracyOption, SeedOption, evaluation_seeds
-from rigid_env.envs.policy_files import load_policy
+from rigid_env.envs.policy_files import act, load_policy
 from rigid_env.envs.pretrained import PRETRAINED, pretrained_path
 from rigid_env.extras import require
 from rigid_env.terminal import make_console, progress_bar, run_program
@@ -41,7 +41,7 @@ def record_episodes(env: gym.Env, policy: Policy, seeds: range, tick=lambda: Non
         observation, _ = env.reset(seed=seed)
         is_over = False
         while not is_over:
-            observation, _, terminated, truncated, info = env.step(policy(observation[None])[0])
+            observation, _, terminated, truncated, info = env.step(act(policy, observation))
             is_over = terminated or truncated
         successes += bool(info["is_success"])
         tick()

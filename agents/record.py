@@ -23,6 +23,7 @@ from agents.evaluate import (
     evaluation_seeds,
 )
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_camera
+from rigid_env.envs.policy_files import act
 from rigid_env.terminal import make_console, run_program
 
 SIZE = (640, 400)  # width and height of the picture [px]; even numbers, which the video's colour format requires
@@ -76,7 +77,7 @@ def _pictures(single: gym.Env, policy: Policy, seeds: range, pause: int) -> Iter
         has_ended = False
         yield single.render()
         while not has_ended:
-            observation, _, terminated, truncated, _ = single.step(policy(observation[None])[0])
+            observation, _, terminated, truncated, _ = single.step(act(policy, observation))
             has_ended = terminated or truncated
             picture = single.render()
             yield picture

@@ -128,13 +128,14 @@ def _accuracy(result: dict[str, Any]) -> str:
 
 
 def index() -> str:
-    """Return the list of all environments, with a line about each."""
+    """Return the list of all environments, with a line about each, and the mean of its seeds or its only one."""
     rows = []
     for env_id in all_ids():
         text = page_of(env_id).read_text(encoding="utf-8")
         first = re.search(r"## Description\n\n(.+?\.)(?:\s|$)", text, re.DOTALL)
         about = " ".join(first[1].split()) if first else ""
-        rate = re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+ %|[\d.]+%)", text, re.MULTILINE)
+        rate = re.search(r"^Interquartile mean of .*?: ([\d.]+%)", text, re.MULTILINE)
+        rate = rate or re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+%)", text, re.MULTILINE)
         rows.append((f"[{short_name(env_id)}]({short_name(env_id)}.md)", about, rate[1] if rate else ""))
     table = machine.markdown_table(["environment", "what the agent does", "trained"], rows)
     return f"{HEAD}\n\n# Every environment\n\n{table}\n"

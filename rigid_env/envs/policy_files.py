@@ -102,6 +102,13 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     return greedy(load_model(path))
 
 
+def act(policy: Callable[[Observations], np.ndarray], observation: Observations) -> np.ndarray:
+    """Return the action (numbers,) of a policy for one observation (entries,), or for a dict of its parts."""
+    if isinstance(observation, Mapping):
+        return policy({name: part[None] for name, part in observation.items()})[0]
+    return policy(observation[None])[0]
+
+
 def tell_code_runs(path: Path) -> None:
     """Print a warning on standard error that the file about to be read can run code."""
     told = "a model of Stable-Baselines3: code in it runs while it is read; take it from those you trust only"

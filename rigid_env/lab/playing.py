@@ -7,7 +7,7 @@ from pathlib import Path
 
 import gymnasium as gym
 
-from rigid_env.envs.policy_files import load_policy
+from rigid_env.envs.policy_files import act, load_policy
 from rigid_env.rendering.picture import GIF_COLOURS, write_gif
 
 SIZE = (480, 300)  # width and height of the pictures [px]
@@ -61,7 +61,7 @@ def _episode(env: gym.Env, policy, seed: int) -> tuple[list, str]:
     observation, _ = env.reset(seed=seed)
     pictures, shown, steps, is_over = [env.render()], FRAME_TIME, 0, False
     while not is_over:
-        observation, _, terminated, truncated, info = env.step(policy(observation[None])[0])
+        observation, _, terminated, truncated, info = env.step(act(policy, observation))
         steps += 1
         is_over = terminated or truncated
         if is_over or steps * control_dt >= shown - 1e-9:

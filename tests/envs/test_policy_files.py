@@ -10,7 +10,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from rigid_env.envs.policy_files import ACTIVATIONS, Network, load_policy
+from rigid_env.envs.policy_files import ACTIVATIONS, Network, act, load_policy
 
 
 def made(rng, activation="tanh", output="linear", sizes=(5, 7, 3)) -> Network:
@@ -45,6 +45,12 @@ def test_parts_of_an_observation_follow_each_other_by_name(rng):
     network = made(rng)
     b, a = rng.normal(size=(2, 2)), rng.normal(size=(2, 3))
     assert np.array_equal(network({"b": b, "a": a}), network(np.concatenate([a, b], axis=1)))
+
+
+def test_one_observation_gets_the_action_of_a_batch_of_one(rng):
+    network, x = made(rng), rng.normal(size=5)
+    np.testing.assert_array_equal(act(network, x), network(x[None])[0])
+    np.testing.assert_array_equal(act(network, {"b": x[3:], "a": x[:3]}), network(x[None])[0])
 
 
 def test_arrays_alone_are_a_policy(tmp_path):
