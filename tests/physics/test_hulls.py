@@ -334,7 +334,7 @@ def test_what_is_not_known_of_hulls_is_refused():
     for field in (physics.Drag(), physics.Magnus(), physics.Buoyancy()):
         with pytest.raises(ValueError, match=rf"{type(field).__name__}, and Scene.bodies\[1\] is a hull; allowed with"):
             physics.Scene([physics.Sphere(1.0, 1.0), hull], [FLOOR], [*laws, field])
-    with pytest.raises(ValueError, match="without hulls"):
+    with pytest.raises(ValueError, match=r"tangential is 0.5, but Scene.bodies\[0\] is a hull; allowed"):
         physics.World(physics.Scene([hull], [FLOOR], [physics.Contact(tangential=0.5), physics.Friction(0.5)]))
     physics.World(physics.Scene([hull], [FLOOR], [*laws, physics.AngularDrag(0.1)]))  # needs no shape
     with pytest.raises(ValueError, match="body is 0, a hull; allowed are blocks, spheres and ellipsoids"):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import physics
 from physics.io.mjcf.files import from_mjcf, read_mjcf
@@ -33,6 +34,15 @@ def assert_same(text_or_path, scene: physics.Scene) -> None:
 @pytest.mark.parametrize("name", READ)
 def test_a_text_gives_the_scene_that_mujoco_simulates(name):
     assert_same(READ[name], from_mjcf(READ[name]))
+
+
+def test_a_cylinder_of_the_world_is_fixed():
+    """`assert_same` knows free bodies alone. The axis is MuJoCo's z, turned by 90° about x: along -y."""
+    scene = from_mjcf(model(box(), world=floor() + '<geom type="cylinder" size=".1 .2" pos="1 2 3" euler="90 0 20"/>'))
+    (found,) = (body for body in scene.bodies if body.fixed)
+    assert (found.kind, found.radius, found.height, found.pos) == ("cylinder", 0.1, 0.4, (1.0, 2.0, 3.0))
+    axis = Rotation.from_quat(found.quat, scalar_first=True).apply((0, 1, 0))
+    np.testing.assert_allclose(axis, (0, -1, 0), atol=1e-15)
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

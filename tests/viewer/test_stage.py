@@ -79,9 +79,9 @@ def test_an_unknown_layer_is_named_with_those_there_are(stage):
 def test_bodies_of_one_shape_are_one_batch(stage, rng):
     bodies = crowd(40, rng)
     stage.show(look_of(bodies))
-    batches = {len(node(stage, f"/scene/bodies/{k}.0").batched_positions) for k in range(4)}
-    assert batches == {8, 16}
-    assert node(stage, "/scene/bodies/4.0") is None
+    batches = {len(node(stage, f"/scene/bodies/{k}.0").batched_positions) for k in range(5)}
+    assert batches == {6, 7, 14}
+    assert node(stage, "/scene/bodies/5.0") is None
     positions = node(stage, "/scene/bodies/1.0").batched_positions
     members = [k for k, body in enumerate(bodies) if body.kind in ("sphere", "ellipsoid")]
     expected = stage.placement.drawn([bodies[k].pos for k in members])
