@@ -87,6 +87,22 @@ DATA = [
         "physics/test_cylinders.py::test_a_tilted_disk_moves_as_the_equations_say",
     ),
     _mutant(
+        "data-grain-stretch",
+        "Friction with two coefficients has the first one across its axis, too.",
+        "data/grain.py",
+        "return t1, times(friction_ratio(many.bodies.body[many.contacts.bodies[k, 0]]), qt.cross(n, t1))",
+        "return t1, qt.cross(n, t1)",
+        "physics/test_anisotropy_between.py::test_both_coefficients_slow_a_body_on_a_body",
+    ),
+    _mutant(
+        "data-grain-axis",
+        "The axis of friction of a body does not turn with it.",
+        "data/grain.py",
+        "    axis = _own_axis(first, many)\n",
+        "    axis = row_vector(many.grain.body_axis, first, 0)\n",
+        "physics/test_anisotropy_between.py::test_an_axis_turns_with_its_body",
+    ),
+    _mutant(
         "data-part-place",
         "The parts of a compound stay where they are while it turns.",
         "data/parts.py",
@@ -205,6 +221,22 @@ NARROWPHASE = [
 
 SOLVER = [
     _mutant(
+        "solver-torque-reaction",
+        "A body on which another one rolls or spins gets the same torque as that one, not the opposite one.",
+        "solver/resistance_torques.py",
+        "minus(row_vector(many.bodies.state, b, at.ANGMOM), T)",
+        "plus(row_vector(many.bodies.state, b, at.ANGMOM), T)",
+        "physics/test_rolling_between.py::test_two_balls_that_spin_on_each_other_exchange_angular_momentum",
+    ),
+    _mutant(
+        "solver-torque-parts",
+        "The limit of spin friction holds for rolling, and that of rolling for spin.",
+        "solver/resistance_torques.py",
+        "return rolling_radius(body) * p, spin_radius(body) * p",
+        "return spin_radius(body) * p, rolling_radius(body) * p",
+        "physics/test_rolling_between.py::test_a_body_slows_a_ball_as_a_wall_does",
+    ),
+    _mutant(
         "solver-scaling",
         "The scaling of two points of the cone adds their tangents instead of their difference.",
         "solver/second_order_cone.py",
@@ -241,6 +273,22 @@ SOLVER = [
 _CASE = "hard_cases/test_cases.py::test_the_case_comes_out_as_it_must"
 
 STEPPING = [
+    _mutant(
+        "stepping-tangential-aim",
+        "An impact aims at the tangential velocity before it in one direction of the plane, not against it.",
+        "stepping/bouncing.py",
+        "= -share * u[1], -share * u[2]",
+        "= -share * u[1], share * u[2]",
+        "physics/test_tangential_between.py::test_two_balls_in_space",
+    ),
+    _mutant(
+        "stepping-tangential-alone",
+        "Tangential restitution acts where a body bounces at several contacts at once, too.",
+        "stepping/bouncing.py",
+        "if i != k and is_at and many.contacts.target[i, 0] >= 0.0 and is_bouncing(i, many):",
+        "if i != k and is_at and many.contacts.target[i, 0] >= 0.0 and is_bouncing(i, many) and i < 0:",
+        "physics/test_tangential_between.py::test_a_ball_in_a_corner_has_friction_alone",
+    ),
     _mutant(
         "stepping-rim",
         "A stage of a lone body goes on where its last contact has passed a rim.",

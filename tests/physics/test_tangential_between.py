@@ -116,6 +116,23 @@ def test_superballs_in_a_box_create_no_energy():
     assert physics.diagnose(built).energy[0].sum() == pytest.approx(before, rel=1e-4)
 
 
+def test_a_ball_in_a_corner_has_friction_alone():
+    """A body that bounces at two contacts at once gets the velocities without tangential restitution, bit for bit."""
+    ends = []
+    for tangential in (1.0, None):
+        balls = [
+            physics.Sphere(R, M, pos=(R + 0.05, R + 0.05, 0), linvel=(-1, -1, 0)),
+            physics.Sphere(R, M, pos=(5, 5, 5)),
+        ]
+        effects = [physics.Contact(1.0, tangential=tangential), physics.Friction(50.0)]
+        walls = [physics.HalfSpace((1, 0, 0)), physics.HalfSpace((0, 1, 0))]
+        built = physics.World(physics.Scene(balls, walls, effects), dt=0.02)
+        built.step(steps=10)
+        ends.append((built.linvel[0], built.angvel[0]))
+    assert abs(ends[0][1][0]).max() > 1.0  # friction has turned it
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
 def test_another_shape_that_moves_is_refused():
     scene = physics.Scene(
         [physics.Sphere(R, M, pos=(0, 2, 0)), physics.Block((1, 1, 1), M)],
