@@ -314,6 +314,22 @@ EVENT_DRIVEN = [
         "scratch.contacts.impulse[k] += 0.0 * (contacts.rebound[k] - scratch.contacts.impulse[k])",
         "physics/test_events.py::test_a_rebound_that_friction_turns_round_takes_all_the_energy_there_is_and_no_more",
     ),
+    _mutant(
+        "event-driven-implicit-table",
+        "The table of the implicit rule takes its error to be a series in the square of a part.",
+        "event_driven/implicit_extrapolation.py",
+        "(_PARTS[k] / _PARTS[k - j] - 1.0)",
+        "((_PARTS[k] / _PARTS[k - j]) ** 2 - 1.0)",
+        "physics/test_events_slow_slide.py::test_a_block_that_friction_nearly_holds_moves_as_its_equations_say",
+    ),
+    _mutant(
+        "event-driven-implicit-sign",
+        "The implicit rule goes against the Jacobian.",
+        "event_driven/implicit_extrapolation.py",
+        "matrix[i, k] = -s * smooth.jacobian[i, k]",
+        "matrix[i, k] = s * smooth.jacobian[i, k]",
+        "physics/test_events_slow_slide.py::test_the_cost_of_a_slow_slide_does_not_grow_with_its_stiffness",
+    ),
 ]
 
 PARALLEL = [

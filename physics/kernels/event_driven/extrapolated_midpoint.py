@@ -166,6 +166,12 @@ def _midpoint_rule(parts, h, offset_frame, scratch, motion):
         y[ROW_END, c] = 0.5 * (y[ROW_CURRENT, c] + y[ROW_PREVIOUS, c] + s * rate[c])
 
 
+@inlined
+def extrapolation_aim(goal, contacts):
+    """Error to which an extrapolation goes on, for the largest error `goal` of a step."""
+    return max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if contacts.count > 0 else goal
+
+
 @kernel
 def try_extrapolated_step(h, offset_frame, scratch, motion):
     """Make a step of length h [s] from ROW_START to ROW_END of `smooth.y`: (relative error, midpoint rules used).
@@ -175,7 +181,7 @@ def try_extrapolated_step(h, offset_frame, scratch, motion):
     smooth = motion.smooth
     table, y = smooth.extrapolation_table, smooth.y
     goal = scratch.settings.tolerance
-    aim = max(_CONTACT_TOLERANCE_SHARE * goal, min(goal, _FINEST_TOLERANCE)) if motion.contacts.count > 0 else goal
+    aim = extrapolation_aim(goal, motion.contacts)
     set_error_scale(h, scratch.body, smooth)
     error = math.inf
     used = MAX_MIDPOINT_RULES

@@ -35,6 +35,7 @@ from physics.kernels.event_driven.guards import (
     least_guard_margin,
     least_start_force_margin,
 )
+from physics.kernels.event_driven.implicit_extrapolation import note_stiffness, try_smooth_step
 from physics.kernels.event_driven.mode_acceptance import has_trusted_guards
 from physics.kernels.event_driven.slip_onset import contact_velocity_rate, has_outrun_creep, sliding_velocity
 from physics.kernels.event_driven.workspace import ROW_END, ROW_START, Y_SIZE
@@ -94,7 +95,7 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion):
             t = low + (high - low) * low_margin / (low_margin - high_margin)
             if stale >= _BISECT_AFTER or not low < t < high:
                 t = 0.5 * (low + high)
-        error, _ = try_extrapolated_step(t, offset_frame, scratch, motion)
+        error, _ = try_smooth_step(t, offset_frame, scratch, motion)
         if not error <= scratch.settings.tolerance:
             return t, GUARD_STEP_FAILED, which
         margin, g, w = least_guard_margin(t, heeds, slack, offset_frame, scratch, motion)
@@ -120,7 +121,7 @@ def locate_event(h, margin, guard, which, heeds, offset_frame, scratch, motion):
         ):
             break
     if margin >= 0.0:
-        try_extrapolated_step(high, offset_frame, scratch, motion)
+        try_smooth_step(high, offset_frame, scratch, motion)
         _, guard, which = least_guard_margin(high, heeds, slack, offset_frame, scratch, motion)
     return high, guard, which
 
@@ -162,7 +163,7 @@ def slide_to_stop(which, left, heeds, offset_frame, scratch, motion):
     along = qt.dot(contact_velocity_rate(which, P, body, motion), row_vector(contacts.start_slip_direction, which, 0))
     if along < 0.0:
         h = min(left, -speed / along)
-        error, _ = try_extrapolated_step(h, offset_frame, scratch, motion)
+        error, _ = try_smooth_step(h, offset_frame, scratch, motion)
         margin, guard, _ = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion)
         if error <= scratch.settings.tolerance and (margin >= 0.0 or guard == GUARD_SPEED):
             advance_clock(h, body)
@@ -191,6 +192,8 @@ def _begin_next_step(left, offset_frame, scratch, motion):
         smooth.gap[ROW_START, s], smooth.gap_rate[ROW_START, s] = gap, rate
     h = prepare_extrapolated_step(left, offset_frame, scratch, motion)
     store_force_margins(ROW_START, scratch, motion)
+    if motion.pace.is_stiff == 1:
+        note_stiffness(h, offset_frame, scratch, motion)
     return h
 
 
@@ -211,11 +214,11 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
         return y, 0.0, GUARD_SPEED  # the projection has removed all of the speed: the body may be at rest
     put_state_row(smooth, ROW_START, y)
     compute_feature_gaps(ROW_START, offset_frame, scratch, smooth)
-    pace.step_length = left if heeds else pace.watched_length
+    pace.step_length, pace.is_stiff = left if heeds else pace.watched_length, 0
     t, h = 0.0, prepare_extrapolated_step(left, offset_frame, scratch, motion)
     store_force_margins(ROW_START, scratch, motion)
     for _ in range(_MAX_SEGMENT_STEPS):
-        error, used = try_extrapolated_step(h, offset_frame, scratch, motion)
+        error, used = try_smooth_step(h, offset_frame, scratch, motion)
         is_over, guard = False, GUARD_STEP_FAILED
         if error <= scratch.settings.tolerance:
             margin, guard, which = least_guard_margin(h, heeds, FORCE_MARGIN_TOLERANCE, offset_frame, scratch, motion)
@@ -231,12 +234,18 @@ def integrate_segment(y, left, offset_frame, scratch, motion):
                 refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
                 continue
         if guard == GUARD_STEP_FAILED:
+            refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
+            if (
+                pace.is_stiff == 0
+                and error > scratch.settings.tolerance
+                and note_stiffness(h, offset_frame, scratch, motion)
+            ):
+                continue
             if not h > SEGMENT_SHORTEST_STEP * left:
                 return get_state_row(smooth, ROW_START), t, GUARD_STEP_FAILED
             # `prepare_extrapolated_step` is not called again: it would use the slip directions at the end of the failed
             # step. The scale of the errors is still that of the start.
             h *= SEGMENT_STEP_CUT
-            refresh_loads(get_state_row(smooth, ROW_START), 0.0, offset_frame, body)
             continue
         t += h
         advance_clock(h, body)

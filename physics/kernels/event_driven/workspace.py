@@ -27,6 +27,10 @@ ROW_START, ROW_END, ROW_PREVIOUS, ROW_CURRENT, ROW_COUNT = 0, 1, 2, 3, 4
 MAX_MIDPOINT_RULES = 8
 
 
+# Entries of a state that the implicit rule solves for: velocity and angular momentum.
+IMPLICIT_SIZE = Y_SIZE - Y_VELOCITY
+
+
 class Motion(NamedTuple):
     """Groups of the event-driven scheme's scratch memory: arrays of one record in Python, records in a kernel."""
 
@@ -62,6 +66,8 @@ def _pace_fields() -> list[tuple]:
         ("sequential_impacts", i),  # sequential impacts so far at this moment
         ("skipped_bounce_time", f),  # time that the bounces left out would have taken [s]
         ("step_length", f),  # length suggested for the next smooth step [s]
+        ("is_stiff", i),  # 1: smooth steps are made by the implicit rule (`implicit_extrapolation`)
+        ("slowest_slip", f),  # speed of the slowest sliding contact at the start of such a step [m/s]
         ("ended_mode", i),  # hash of the contact mode that a force guard has ended
         ("distrusted_mode", i),  # hash of the contact mode whose force guards are ignored (`mode_acceptance`)
         ("watched_length", f),  # length of the next step without force guards [s]
@@ -143,6 +149,10 @@ def _smooth_fields(walls: int, slots: int) -> list[tuple]:
         ("last_rate", f, (Y_SIZE,)),  # rate of change at the end of the step
         ("scale", f, (Y_SIZE,)),  # units of the errors of the state
         ("extrapolation_table", f, (MAX_MIDPOINT_RULES, Y_SIZE)),  # a row of Neville's table
+        ("jacobian", f, (IMPLICIT_SIZE, IMPLICIT_SIZE)),  # change of the rates of (v, L) with (v, L)
+        ("implicit_matrix", f, (IMPLICIT_SIZE, IMPLICIT_SIZE + 1)),  # linear system of a part of the implicit rule
+        ("implicit_order", i, (IMPLICIT_SIZE,)),
+        ("implicit_change", f, (IMPLICIT_SIZE,)),  # its solution
     ]  # fmt: skip
 
 
