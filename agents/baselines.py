@@ -5,6 +5,8 @@ A policy is a function from observations (n, entries) to actions (n, axes).
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from rigid_env.envs.controllers import AXES, CONTROLLERS, Policy, load_controller, reach_controller, reorient_controller
@@ -28,7 +30,12 @@ def random_policy(seed: int = 0, axes: int = AXES) -> Policy:
         (n, entries) float32 to (n, axes) float32.
     """
     generator = np.random.default_rng(seed)
-    return lambda observations: generator.uniform(-1.0, 1.0, (len(observations), axes)).astype(np.float32)
+    return lambda observations: generator.uniform(-1.0, 1.0, (count_of(observations), axes)).astype(np.float32)
+
+
+def count_of(observations: np.ndarray | Mapping[str, np.ndarray]) -> int:
+    """Return the number of worlds in a batch of observations, which are dicts of arrays where a task has goals."""
+    return len(next(iter(observations.values())) if isinstance(observations, Mapping) else observations)
 
 
 def action_size(env_id: str) -> int:

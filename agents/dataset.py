@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
@@ -78,7 +79,9 @@ def main(
             seeds = evaluation_seeds(seed, episodes)
             successes = record_episodes(collector, chosen, seeds, lambda: bar.advance(task))
         made = name or default_name(env, policy)
-        collector.create_dataset(made, algorithm_name=policy, description=f"{policy} on {env} at {accuracy}")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of data about authors, which a user may add with Minari
+            collector.create_dataset(made, algorithm_name=policy, description=f"{policy} on {env} at {accuracy}")
         collector.close()
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error

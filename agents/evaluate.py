@@ -173,6 +173,8 @@ def make_table(result: dict[str, Any], title: str) -> Table:
     low, high = result["interval"]
     table = Table([Column("quantity", is_whole=True), "value"], title)
     table.add_row("environment", result["env"])
+    if "accuracy" in result:
+        table.add_row("accuracy", str(result["accuracy"]))
     table.add_row("episodes", f"{result['episodes']} (seed {result['seed']})")
     table.add_row("success rate", f"{result['success_rate']:.1%}  ({low:.1%} to {high:.1%}, 95 %)")
     table.add_row("return", f"{result['return_mean']:.3f} ± {result['return_std']:.3f}")

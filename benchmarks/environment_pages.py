@@ -138,7 +138,8 @@ def index() -> str:
         rate = rate or re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+%)", text, re.MULTILINE)
         rows.append((f"[{short_name(env_id)}]({short_name(env_id)}.md)", about, rate[1] if rate else ""))
     table = machine.markdown_table(["environment", "what the agent does", "trained"], rows)
-    return f"{HEAD}\n\n# Every environment\n\n{table}\n"
+    ids = f'The id of each is `{NAMESPACE}/` and its name: `gymnasium.make("{NAMESPACE}:{NAMESPACE}/BlockReach-v0")`.'
+    return f"{HEAD}\n\n# Every environment\n\n{ids}\n\n{table}\n"
 
 
 def draw_pictures(env_id: str, results: Path) -> None:

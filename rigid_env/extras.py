@@ -26,7 +26,7 @@ EXTRAS: dict[str, dict[str, str]] = {
     "view": {"viser": "viser"},
     "ray": {"ray": "Ray", "pandas": "pandas", "pyarrow": "pyarrow"},
     "submitit": {"submitit": "submitit"},
-    "minari": {"minari": "Minari", "h5py": "h5py"},
+    "minari": {"minari": "Minari", "h5py": "h5py", "jax": "JAX"},
     "pettingzoo": {"pettingzoo": "PettingZoo"},
     "bench": {"mujoco": "MuJoCo"},
     "peers": {"mujoco": "MuJoCo", "pybullet": "PyBullet", "pydrake": "Drake"},

@@ -87,7 +87,7 @@ def play(
         if video is None:
             from rigid_env.extras import require
 
-            require("view", purpose="the viewer, without --video")
+            require("view", purpose="the viewer (which --video FILE.gif does without)")
             settings = {"accuracy": accuracy, "dt": None, "seed": seed, "policy": PRETRAINED, "controller": False}
             _serve(env, "127.0.0.1", port, browser, settings, console)
             return

@@ -12,6 +12,7 @@ from typing import Any
 from physics.keywords import nearest_first
 from rigid_env.envs.arguments import CommonArguments
 from rigid_env.tasks import Task
+from rigid_env.tasks.arguments import constructor_arguments
 
 OF_ENVIRONMENT = [each.name for each in fields(CommonArguments)]
 """Names of settings that belong to an environment, not to its task."""
@@ -63,23 +64,10 @@ def make_task(task: type[Task] | str, worlds: int, settings: Mapping[str, Any]) 
 
 def check_settings(kind: type[Task], settings: Mapping[str, Any], of_environment: bool = False) -> None:
     """Raise a TypeError for a setting that neither the task nor its environment knows."""
-    known = _settings_of(kind)
+    known = [*constructor_arguments(kind)]
     if of_environment:
         known += OF_ENVIRONMENT
     for name in settings:
         if name not in known:
             allowed = ", ".join(nearest_first(name, known))
             raise TypeError(f"{kind.__name__} got the argument {name!r}; allowed are {allowed}")
-
-
-def _settings_of(kind: type[Task]) -> list[str]:
-    """Arguments of a task's constructor, and of constructors that it passes others on to."""
-    names: list[str] = []
-    for each in kind.__mro__:
-        if "__init__" not in vars(each):
-            continue
-        parameters = inspect.signature(vars(each)["__init__"]).parameters
-        names += [name for name, about in parameters.items() if about.kind is not inspect.Parameter.VAR_KEYWORD]
-        if all(about.kind is not inspect.Parameter.VAR_KEYWORD for about in parameters.values()):
-            break
-    return [name for name in dict.fromkeys(names) if name not in ("self", "worlds")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from physics.keywords import nearest_first
 from rigid_env.envs.registration import NAMESPACE
 
 FOLDER = Path(__file__).parents[1] / "suite" / "policies"
@@ -36,5 +37,6 @@ def pretrained_path(env_id: str) -> Path:
     found = ID.fullmatch(env_id)
     path = FOLDER / f"{found[1]}.npz" if found else FOLDER
     if not path.is_file():
-        raise ValueError(f"env is {env_id!r}, without a trained policy; allowed are {', '.join(pretrained_ids())}")
+        allowed = ", ".join(nearest_first(env_id, pretrained_ids()))
+        raise ValueError(f"env is {env_id!r}, for which there is no trained policy; allowed are {allowed}")
     return path

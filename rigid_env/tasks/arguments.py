@@ -53,6 +53,20 @@ def part(given: Any, *groups: type) -> dict[str, Any]:
     return {each.name: getattr(given, each.name) for group in groups for each in fields(group)}
 
 
+def constructor_arguments(kind: type) -> dict[str, inspect.Parameter]:
+    """Arguments of a task's constructor, and of constructors that it passes others on to, without `worlds`."""
+    found: dict[str, inspect.Parameter] = {}
+    for each in kind.__mro__:
+        if "__init__" not in vars(each):
+            continue
+        parameters = inspect.signature(vars(each)["__init__"]).parameters
+        own = {name: about for name, about in parameters.items() if about.kind is not inspect.Parameter.VAR_KEYWORD}
+        found = {**found, **{name: about for name, about in own.items() if name not in found}}
+        if len(own) == len(parameters):
+            break
+    return {name: about for name, about in found.items() if name not in ("self", "worlds")}
+
+
 @dataclass(frozen=True)
 class BatchArguments:
     """Argument for the number of worlds in a batch; see `rigid_env.Task`."""

@@ -16,6 +16,7 @@ from physics import Body
 from physics.scene.body_names import body_label
 from physics.summary import counted
 from rigid_env.tasks.actions import FORCE, IMPULSE, TORQUE
+from rigid_env.tasks.arguments import constructor_arguments
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.goal import GoalTask
 from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meaning, draw_meaning
@@ -231,11 +232,7 @@ def _end(task: Task) -> Section:
 
 def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, Any]) -> Section:
     kind = type(task)
-    known = {
-        name: parameter.default
-        for name, parameter in inspect.signature(kind.__init__).parameters.items()
-        if name not in ("self", "worlds")
-    }
+    known = {name: each.default for name, each in constructor_arguments(kind).items()}
     meanings = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)

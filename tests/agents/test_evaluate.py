@@ -68,6 +68,18 @@ def test_controller_beats_random(env):
     assert chance <= 0.1
 
 
+def test_chance_has_an_action_for_each_world_of_a_task_with_goals():
+    """Observations of such a task are a dict of arrays, whose length is not the number of worlds."""
+    policy = baseline_policy("random", "rigid_env/BlockReachGoal-v0")
+    assert policy({"observation": np.zeros((5, 20)), "achieved_goal": np.zeros((5, 4))}).shape == (5, 6)
+    assert policy(np.zeros((7, 20))).shape == (7, 6)
+
+
+def test_the_table_tells_the_accuracy_of_the_judge():
+    table = module.make_table(evaluate(REACH, reach_controller, 2, 0, accuracy="fast"), "title")
+    assert ["accuracy", "fast"] in [[str(cell) for cell in row] for row in table.rows]
+
+
 def test_number_of_episodes_is_checked():
     with pytest.raises(ValueError, match="episodes is 0; allowed is 1"):
         evaluate(REACH, reach_controller, 0, 0)

@@ -63,12 +63,12 @@ def test_a_policy_needs_no_library_of_agents():
 
 def test_an_environment_without_a_policy_is_refused_with_those_that_have_one():
     with pytest.raises(
-        ValueError, match=r"env is 'rigid_env/BlockFly-v0', without a trained policy; allowed are .*Reach"
+        ValueError, match=r"env is 'rigid_env/BlockFly-v0', for which there is no trained policy; allowed are .*Reach"
     ):
         rigid_env.load_policy("rigid_env/BlockFly-v0")
     done = CliRunner().invoke(app, ["play", "rigid_env/BlockFly-v0"])
     assert done.exit_code == 2
-    assert "without a trained policy" in " ".join(done.output.split())
+    assert "no trained policy" in " ".join(done.output.split())
 
 
 def test_what_is_an_id():
