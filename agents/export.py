@@ -19,8 +19,8 @@ from rigid_env.cli.files import checked, make_parents
 from rigid_env.envs.policy_files import ARRAYS, Network
 from rigid_env.terminal import make_console, run_program
 
-FEATURES = ("FlattenExtractor", GoalDifference.__name__)
-"""Names of the classes that a policy may put before its network."""
+FEATURES = ("FlattenExtractor", "CombinedExtractor", GoalDifference.__name__)
+"""Classes that a policy may put before its network, by name; the second joins vectors in the order of their names."""
 
 
 def network_of(model: BaseAlgorithm) -> Network:

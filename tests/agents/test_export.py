@@ -36,11 +36,12 @@ def test_it_acts_as_the_model(kind, env, tmp_path):
         assert file["w0"].dtype == np.float32
 
 
-@pytest.mark.parametrize("kind", [PPO, SAC])
-def test_goals_are_compared_as_in_the_model(kind):
+@pytest.mark.parametrize(
+    ("kind", "features"), [(PPO, {}), *((kind, {"features_extractor_class": GoalDifference}) for kind in (PPO, SAC))]
+)
+def test_goals_are_compared_as_in_the_model(kind, features):
     goals = RigidVecEnv(make_vector_env("rigid_env/BlockReachGoal-v0", 2, autoreset_mode="SameStep"))
-    policy = {"net_arch": [16, 8], "features_extractor_class": GoalDifference}
-    model = kind("MultiInputPolicy", goals, seed=0, device="cpu", policy_kwargs=policy)
+    model = kind("MultiInputPolicy", goals, seed=0, device="cpu", policy_kwargs={"net_arch": [16, 8], **features})
     rng = np.random.default_rng(0)
     seen = {
         name: rng.normal(size=(50, *part.shape)).astype(np.float32)
