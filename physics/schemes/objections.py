@@ -24,6 +24,8 @@ DECLARED = {
 }  # fmt: skip
 """Names of the effects or fields that declare each contact law."""
 
+TOUCHED = {"sphere", "block", "hull"}
+
 _OF_STAGES = (LAW_STIFFNESS,)
 
 
@@ -129,7 +131,7 @@ def to_cylinders(scene: Scene, needs: Needs) -> str:
     pairs = potential_pairs(scene, between) if pairs is None else pairs
     kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
     for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
-        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
+        if "cylinder" in kinds[b] and not kinds[other] <= TOUCHED:
             return (
                 f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; a cylinder touches walls "
                 "and spheres: allowed are Contact(between_bodies=False) where no fixed body is met, and groups that "
