@@ -13,7 +13,7 @@ from physics.kernels.multibody.data.arrays import FEATURES_PER_PAIR, NUM_CONTACT
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
-from physics.kernels.multibody.data.cylinder_balls import normal_beside_cylinder
+from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
@@ -400,6 +400,8 @@ def _carried_point(b, k, first, side, n, many):
     if rolls_on_rim(k, b, many):
         way, place = (side * n[0], side * n[1], side * n[2]), many.contacts.anchor[k, first + 1]
         return from_body(b, rolling_arm(b, place, row_matrix(many.bodies.rotation, b), way, many), many)
+    if is_beside_cylinder(k, b, first, many):
+        return from_body(b, add_scaled(ball_arm(k, b, first, many), side * d[0], n), many)
     arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 

@@ -2,7 +2,8 @@
 
 The gap is the distance φ of the ball's centre from the cylinder, less its radius. The point of the cylinder slides over
 its surface so that it stays the nearest one. The ball is a sphere, one about a point of a capsule's axis, or a point of
-a polyhedron beside the side of the cylinder, of which its body carries the centre along.
+a polyhedron beside the side of the cylinder, of which its body carries the centre along. Where two sides are beside
+each other, it is a ball about a point of the second axis.
 """
 
 from __future__ import annotations
@@ -14,8 +15,14 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import FEATURES_PER_PAIR
 from physics.kernels.multibody.data.capsules import is_capsule
-from physics.kernels.multibody.data.cylinders import BESIDE_FEATURE, SINGLE_FEATURE, is_cylinder, rotation_of
-from physics.kernels.multibody.data.parts import body_of, center_velocity
+from physics.kernels.multibody.data.cylinders import (
+    BESIDE_FEATURE,
+    SINGLE_FEATURE,
+    axis_of,
+    is_cylinder,
+    rotation_of,
+)
+from physics.kernels.multibody.data.parts import body_of, center_velocity, first_part
 from physics.kernels.state.layout import SPHERE
 
 
@@ -81,11 +88,24 @@ def _cylinder_and_ball(k, a, b, many):
 
 
 @inlined
-def _ball_arm(k, ball, first, many):
+def ball_arm(k, ball, first, many):
     """Centre of the ball of contact k from the centre of its part, world frame [m]; `first` is its anchor's column."""
     if many.bodies.body[ball].shape == SPHERE:
         return (0.0, 0.0, 0.0)
+    if is_cylinder(ball, many):
+        return times(many.contacts.anchor[k, first + 1], axis_of(rotation_of(ball, many)))
     return qt.matvec(rotation_of(ball, many), row_vector(many.contacts.anchor, k, first))
+
+
+@if_given("many.bodies.cylinders", False)
+def is_beside_cylinder(k, b, first, many):
+    """True if part b is the second one of two cylinders whose sides are beside each other in contact k.
+
+    `first` is the column of its anchor. Its point stays under a point of its axis, as that of a capsule.
+    """
+    if first == 0 or not (is_cylinder(b, many) and many.contacts.owner[k] == -1 and _is_beside(k, many)):
+        return False
+    return is_cylinder(first_part(k, many), many)
 
 
 def _same_normal(k, a, b, n, many):
@@ -102,7 +122,7 @@ def normal_beside_cylinder(k, a, b, n, many):
     if can < 0:
         return n
     first, other = (0, 3) if can == a else (3, 0)
-    x = plus(row_vector(many.bodies.center, ball, 0), _ball_arm(k, ball, other, many))
+    x = plus(row_vector(many.bodies.center, ball, 0), ball_arm(k, ball, other, many))
     _, m, p = _nearest(can, x, _is_beside(k, many), many)
     for c in range(3):
         many.contacts.anchor[k, first + c] = p[c]
@@ -155,5 +175,5 @@ def less_turn_beside_cylinder(k, a, b, time, target, many):
     can, ball = _cylinder_and_ball(k, a, b, many)
     if can < 0:
         return target
-    arm = _ball_arm(k, ball, 3 if can == a else 0, many)
+    arm = ball_arm(k, ball, 3 if can == a else 0, many)
     return (target[0] - time * _turn_beside(can, ball, arm, _is_beside(k, many), many), target[1], target[2])

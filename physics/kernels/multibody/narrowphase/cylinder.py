@@ -8,6 +8,7 @@ from physics.kernels.multibody.data.contact_set import add_ordered_contact, add_
 from physics.kernels.multibody.data.cylinder_balls import nearest_of_cylinder
 from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.narrowphase.cylinder_hull import collide_cylinder_hull
+from physics.kernels.multibody.narrowphase.cylinder_pair import collide_cylinders
 from physics.kernels.state.layout import SPHERE
 
 
@@ -36,7 +37,9 @@ def collide_cylinder(a, b, margin, h, many):
         if not is_cylinder(b, many):
             return False
         can, other = b, a
-    if many.bodies.body[other].shape == SPHERE:
+    if is_cylinder(other, many):
+        collide_cylinders(a, b, margin, h, many)
+    elif many.bodies.body[other].shape == SPHERE:
         _collide_with_sphere(can, other, a, b, margin, h, many)
     else:
         _collide_with_hull(can, other, margin, h, many)

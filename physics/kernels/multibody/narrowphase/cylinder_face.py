@@ -36,6 +36,7 @@ from physics.kernels.multibody.data.cylinders import (
 from physics.kernels.multibody.data.hull_tables import FIRST_FACE
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
 from physics.kernels.multibody.data.parts import body_of
+from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE
 from physics.kernels.multibody.narrowphase.flat_ends import (
     first_of_ring,
     is_level,
@@ -185,7 +186,7 @@ def add_outline(pair, face, end, limits, h, many):
 def add_flat_end(pair, face, end, limits, h, many):
     """Add the ring of an end that may lie flat on a face within h [s]: (least gap [m], whether it may).
 
-    Arguments are those of `add_outline`.
+    An end that leans by more than 11 degrees does not count. Arguments are those of `add_outline`.
     """
     can, other = pair
     n, offset = face_plane(other, face, many)
@@ -193,7 +194,9 @@ def add_flat_end(pair, face, end, limits, h, many):
     p, arm = across_axis(axis_of(R), n), rim_arm(can, end, R, times(-1.0, n), many)
     height = 2.0 * many.bodies.body[can].dims[0] * math.sqrt(qt.dot(p, p))
     gap = qt.dot(n, plus(place_between(pair, many), arm)) - offset
-    if gap > limits[1] or not may_lie_flat(can, end, other, n, arm, (gap, height), h, many):
+    if gap > limits[1] or abs(qt.dot(n, axis_of(R))) < FLAT_COSINE:
+        return math.inf, False
+    if not may_lie_flat(can, end, other, n, arm, (gap, height), h, many):
         return math.inf, False
     return _add_ring(pair, face, end, arm, height, limits, h, many), True
 

@@ -58,6 +58,9 @@ from physics.kernels.multibody.narrowphase.segment_polyhedron import edge_segmen
 # Cosine of the angle between an edge and the axis from which on the edge lies along the side (8 degrees).
 _ALONG_COSINE = 0.99
 
+# Component along the axis up to which a direction is nearly that of the side (11 degrees).
+_FLAT_SINE = 0.2
+
 # Component along the axis up to which a direction is that of the side.
 _SIDE_SINE = 1.0e-6
 
@@ -109,16 +112,18 @@ def _add_edge_along(pair, e, x, limits, h, many):
 
 
 @inlined
-def _edge_along(pair, n, corner, many):
-    """Edge at a corner of the polyhedron that is most along the axis of the cylinder; -1 if it is not nearly so."""
+def _edge_along(pair, kind, index, many):
+    """Edge of the polyhedron at the features of `best_of_others` that is most along the cylinder's axis, -1 if none."""
     hulls, y, best, found = many.narrowphase.hulls, axis_of(rotation_of(pair[0], many)), _ALONG_COSINE, -1
     first = hulls.of[pair[1], FIRST_EDGE]
     for e in range(hulls.of[pair[1], LAST_EDGE] - first):
-        if hulls.edges[first + e, EDGE_START] == corner or hulls.edges[first + e, EDGE_END] == corner:
+        is_there = e == index
+        if kind == AT_CORNER:
+            is_there = hulls.edges[first + e, EDGE_START] == index or hulls.edges[first + e, EDGE_END] == index
+        if is_there:
             _, d, _, _ = hull_edge(0, pair[1], e, many)
-            size = math.sqrt(qt.dot(d, d))
-            c = abs(qt.dot(d, y)) / size
-            if c > best and abs(qt.dot(d, n)) <= (1.0 - FLAT_COSINE) * size:
+            c = abs(qt.dot(d, y)) / math.sqrt(qt.dot(d, d))
+            if c > best:
                 best, found = c, e
     return found
 
@@ -126,16 +131,14 @@ def _edge_along(pair, n, corner, many):
 @kernel
 def _add_single(pair, kind, index, n, x, limits, h, many):
     """Add the contact of the features that separate best, of the kind and number as of `best_of_others`."""
-    (can, hull), hulls, R = pair, many.narrowphase.hulls, rotation_of(pair[0], many)
-    l, y, (least, margin) = many.bodies.body[pair[0]].dims[1], axis_of(R), limits
-    edge = -1
-    if kind == SIDE_AND_EDGE or (kind == AT_CORNER and abs(qt.dot(n, y)) <= _SIDE_SINE):
-        corner = farthest_corner(hull, n, many)[1] if kind == SIDE_AND_EDGE else index
-        edge = _edge_along(pair, n, corner, many)
-    if edge >= 0:
-        _add_edge_along(pair, edge, x, limits, h, many)
-        return
-    if kind == AT_CORNER and abs(qt.dot(n, y)) <= _SIDE_SINE:
+    (can, hull), hulls, R, least = pair, many.narrowphase.hulls, rotation_of(pair[0], many), limits[0]
+    l, y = many.bodies.body[can].dims[1], axis_of(R)
+    edge, tilt = _edge_along(pair, kind, index, many), abs(qt.dot(n, y))
+    if edge >= 0 and tilt <= _FLAT_SINE:
+        low = _add_edge_along(pair, edge, x, limits, h, many)
+        if low <= least + pair_slop(body_of(can, many), body_of(hull, many), many):
+            return
+    if kind == AT_CORNER and tilt <= _SIDE_SINE:
         _add_beside(pair, BESIDE_FEATURE, row_vector(hulls.corner[0], index, 0), x, limits, h, many)
         return
     p = plus(x, cylinder_support_arm(many.bodies.body[can].dims, R, times(-1.0, n)))

@@ -35,7 +35,7 @@ from physics.kernels.multibody.data.contact_set import (
     subtract,
     update_contacts,
 )
-from physics.kernels.multibody.data.cylinder_balls import less_turn_beside_cylinder
+from physics.kernels.multibody.data.cylinder_balls import is_beside_cylinder, less_turn_beside_cylinder
 from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rolling_acceleration, rolling_rate
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
@@ -118,7 +118,7 @@ def _centripetal(b, k, first, side, h, many):
             return (0.0, 0.0, 0.0)
         return plus_free_turn(k, b, first, plus_turning(b, rolling_acceleration(k, b, first, side, many), many), many)
     arm = row_vector(many.contacts.arm, k, first)
-    if is_capsule(b, many):
+    if is_capsule(b, many) or is_beside_cylinder(k, b, first, many):
         arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
     return plus_free_turn(k, b, first, qt.cross(w, qt.cross(w, arm)), many)
 
