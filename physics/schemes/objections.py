@@ -24,7 +24,7 @@ DECLARED = {
 }  # fmt: skip
 """Names of the effects or fields that declare each contact law."""
 
-TOUCHED = {"sphere", "block", "hull", "cylinder"}
+TOUCHED = {"sphere", "block", "hull", "cylinder", "capsule", "ellipsoid"}
 
 _OF_STAGES = (LAW_STIFFNESS,)
 
