@@ -96,7 +96,7 @@ def _add_ring(pair, face, end, lowest, height, limits, h, many):
         if qt.dot(out, out) > 0.0:
             low = _add_point(pair, LOWEST_FEATURE + end, face, lowest, limits, h, many)
     mu = pair_coefficients(body_of(can, many), body_of(other, many), many)[0]
-    along = first_of_ring(can, end, lowest, height, mu, n, many)
+    along = first_of_ring(can, end, other, lowest, height, mu, n, many)
     for k in range(RING_POINTS):
         feature = RING_FEATURE + RING_POINTS * end + k
         low = min(low, _add_point(pair, feature, face, ring_arm(can, end, k, along, many), limits, h, many))

@@ -120,7 +120,8 @@ def best_of_others(can, hull, x, many):
     for k in range(hulls.of[hull, LAST_CORNER] - hulls.of[hull, FIRST_CORNER]):
         _, m, _ = nearest_of_cylinder(can, plus(origin, row_vector(hulls.corner[0], k, 0)), many)
         m = times(-1.0, m)
-        apart = _separation(can, hull, x, m, many)
+        reach, corner = farthest_corner(hull, m, many)  # behind which corner k may lie
+        apart = qt.dot(m, x) - cylinder_support(can, rotation_of(can, many), m, many) - reach
         if apart > best:
-            best, n, kind, index = apart, m, AT_CORNER, k
+            best, n, kind, index = apart, m, AT_CORNER, corner
     return best, n, kind, index

@@ -54,7 +54,7 @@ def _add_ring(b, end, wall, lowest, height, margin, h, many):
         if qt.dot(out, out) > 0.0:  # else no point of the rim is the lowest one
             _add_point(b, LOWEST_FEATURE + end, wall, lowest, margin, h, many)
     mu = friction_at(wall, many.bodies.body[body_of(b, many)])
-    along = first_of_ring(b, end, lowest, height, mu, n, many)
+    along = first_of_ring(b, end, -1 - wall, lowest, height, mu, n, many)
     for k in range(RING_POINTS):
         _add_point(b, RING_FEATURE + RING_POINTS * end + k, wall, ring_arm(b, end, k, along, many), margin, h, many)
 

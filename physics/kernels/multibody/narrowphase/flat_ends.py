@@ -4,7 +4,7 @@ On a face a cylinder would touch with a disk. The points of a ring about it carr
 whose resultant passes within the polygon of these points. One of them is
 
 - the lowest point of the rim, while the rim is tilted, or
-- the point towards which the loads would tip a cylinder that stands.
+- the point towards which the loads would tip a cylinder that stands, or a body that stands on it.
 
 So a cylinder tips over exactly this point. Where other bodies press on it, the polygon reaches at least
 r cos(π/`RING_POINTS`) far, 7.6 % less than the disk.
@@ -93,17 +93,32 @@ def middle_of_end(b, end, R, many):
     return times((2.0 * end - 1.0) * many.bodies.body[b].dims[1], axis_of(R))
 
 
+@inlined
+def _leaning_direction(b, other, middle, mu, n, many):
+    """Do the work of `_tipping_direction` for the body that its loads press on the other one, of parts b and `other`.
+
+    That is cylinder b unless they pull it away from the face. `middle` leads from the centre of b.
+    """
+    body = body_of(b, many)
+    if other >= 0 and not qt.dot(n, as_vector(many.bodies.body[body].free_acceleration)) < 0.0:
+        point, rider = plus(row_vector(many.bodies.center, b, 0), middle), body_of(other, many)
+        arm = minus(point, row_vector(many.bodies.state, rider, 0))
+        return _tipping_direction(rider, arm, mu, times(-1.0, n), many)
+    return _tipping_direction(body, from_body(b, middle, many), mu, n, many)
+
+
 @kernel
-def first_of_ring(b, end, lowest, height, mu, n, many):
+def first_of_ring(b, end, other, lowest, height, mu, n, many):
     """First point of the ring of a rim of cylinder b on a face with the normal n, from the middle of the end [m].
 
-    `lowest` is the arm of its lowest point, `height` how much higher the highest one is [m], `mu` the friction.
+    The face belongs to part `other`, below 0 for a wall. `lowest` is the arm of the rim's lowest point, `height` how
+    much higher the highest one is [m], `mu` the friction.
     """
     R, r = row_matrix(many.bodies.rotation, b), many.bodies.body[b].dims[0]
     middle = middle_of_end(b, end, R, many)
     along = minus(lowest, middle)
     if is_level(b, height, many):
-        along = across_axis(axis_of(R), _tipping_direction(body_of(b, many), from_body(b, middle, many), mu, n, many))
+        along = across_axis(axis_of(R), _leaning_direction(b, other, middle, mu, n, many))
     square = qt.dot(along, along)
     if not square > 0.0:
         along, square = (R[0], R[3], R[6]), 1.0

@@ -28,6 +28,9 @@ _NEWTON_STEPS = 60
 # Change of t at which Newton's method ends.
 _ROUNDING = 1.0e-16
 
+# Semi-axis b or coordinate that is no different from 0, and whose square does not underflow.
+_LEAST = 1.0e-100
+
 # Square of the sine of the angle below which a line is across the disk: the ellipse is a circle then.
 _ACROSS_SINE_SQUARED = 1.0e-24
 
@@ -50,6 +53,7 @@ def _largest_root(b, x, y):
 def ellipse_normal(b, x, y):
     """Outward unit normal (2) of an ellipse at its point nearest to (x, y); its semi-axes are 1 and b, 0 <= b <= 1."""
     p, q = abs(x), abs(y)
+    b, q = b if b > _LEAST else 0.0, q if q > _LEAST else 0.0
     if b * q > 0.0:
         t = _largest_root(b, p, q)
         u, v = p / (t + 1.0), q / (t + b * b)
