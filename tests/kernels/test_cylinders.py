@@ -86,7 +86,7 @@ def moved(body, way):
 
 
 def look_at_pair(kind, seed, swaps, is_near):
-    """Hold the least gap of a pair to the reference: it is reached along a normal, and no direction has a larger one."""
+    """Hold the least gap of a pair to the reference: a normal has it as its separation, and no direction more."""
     rng = np.random.default_rng(seed)
     can, other = drawn_cylinder(rng, 1.5), drawn_body(rng, kind)
     true, n = separation(can, other)

@@ -1,9 +1,9 @@
 """Separation of two convex bodies from their support functions alone, by a search over all directions.
 
-Along a unit vector n out of the second body the two are apart by σ(n) = n·(x - y) - s_1(-n) - s_2(n), with centres x and
-y and support functions s. The largest σ is the distance of the bodies; if it is negative, the shortest way that moves
-them apart. The search samples the sphere, then cones about the best samples, each of which shrinks where it finds nothing better. It needs neither
-derivatives nor features, so that kinks of a support function do not matter.
+Along a unit vector n out of the second body the two are apart by σ(n) = n·(x - y) - s_1(-n) - s_2(n), with centres x
+and y and support functions s. The largest σ is the distance of the bodies; if it is negative, the shortest way that
+moves them apart. The search samples the sphere, then cones about the best samples, each of which shrinks where it finds
+nothing better. It needs neither derivatives nor features, so that kinks of a support function do not matter.
 """
 
 from __future__ import annotations

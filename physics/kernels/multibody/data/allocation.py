@@ -112,8 +112,9 @@ def warm_start_size(
 ) -> int:
     """Number of columns of a world's row of `memory`, the warm start (`arrays.WARM_CONTACT_ID`, ...).
 
-    `bodies`, `polyhedra` and `cylinders` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps
-    one number more. `laws` are those of the scene: rolling and spin friction keep a torque for each contact.
+    `bodies`, `polyhedra` and `cylinders` are as in `contact_capacity`. `refined` says that substeps have error control,
+    which keeps one number more. `laws` are those of the scene: rolling and spin friction keep a torque for each
+    contact.
     """
     room = contact_capacity(bodies, walls, polyhedra, cylinders)
     return WARM_HEADER_SIZE + warm_contact_size(laws) * room + int(refined)

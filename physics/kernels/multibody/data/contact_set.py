@@ -14,7 +14,7 @@ from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
 from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
-from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rolling_arm
+from physics.kernels.multibody.data.cylinders import is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.grain import grain_tangents
@@ -28,6 +28,7 @@ from physics.kernels.multibody.data.parts import (
     note_parts,
     second_part,
 )
+from physics.kernels.multibody.data.rolling_points import rolls_on_rim
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Owner of a contact whose normal is that of a plane between two bodies that pass each other (`stepping.passing_pairs`).
@@ -364,22 +365,6 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
         add_contact(a, b, 0, -1, n, (on_first, on_second), gap, h, many)
     else:
         add_contact(a, b, 0, -1, (-n[0], -n[1], -n[2]), (on_second, on_first), gap, h, many)
-
-
-@inlined
-def rolls_on_rim(k, b, many):
-    """True if body or part b is a cylinder whose point in contact k, with a wall or face, rolls over its surface."""
-    if not is_cylinder(b, many) or many.contacts.id[k] % FEATURES_PER_PAIR >= ROLLING_FEATURES:
-        return False
-    owner = many.contacts.owner[k]
-    return body_at(many.contacts.bodies[k, 1], many) < 0 or (owner >= 0 and owner != b)
-
-
-@if_given("many.bodies.cylinders", False)
-def may_roll(k, many):
-    """True if a point of contact k rolls over the surface of a cylinder."""
-    end = body_at(many.contacts.bodies[k, 1], many)
-    return rolls_on_rim(k, first_part(k, many), many) or (end >= 0 and rolls_on_rim(k, second_part(end, k, many), many))
 
 
 @inlined

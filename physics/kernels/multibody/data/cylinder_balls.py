@@ -38,7 +38,8 @@ def _from_side_and_end(dims, y):
 def nearest_in_frame(dims, y):
     """Nearest point of the surface of a cylinder to a point y: (distance, n, point), all in the frame of the cylinder.
 
-    `dims` are its half extents, of which half the length may be infinite. The distance is negative inside, where n leads the shortest way out.
+    `dims` are its half extents, of which half the length may be infinite. The distance is negative inside, where n
+    leads the shortest way out.
     """
     side, end, out = _from_side_and_end(dims, y)
     sign = math.copysign(1.0, y[1])

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import if_given, inlined, kernel
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.parts import body_of
@@ -117,12 +117,12 @@ def rolling_arm(b, place, R, k, many):
 
 @inlined
 def rim_arm(b, end, R, k, many):
-    """Point of a rim of cylinder b, 0: the lower, 1: the upper one, that reaches farthest along k; see `rolling_arm`."""
+    """Point of the lower (0) or upper (1) rim of cylinder b that reaches farthest along k; see `rolling_arm`."""
     return rolling_arm(b, (2.0 * end - 1.0) * many.bodies.body[b].dims[1], R, k, many)
 
 
 @inlined
-def _rolling_arm_rate(b, place, R, w, k, many):
+def rolling_arm_rate(b, place, R, w, k, many):
     """Velocity of the point of `rolling_arm`, as it rolls along its circle while k stays as it is [m/s].
 
     The cylinder turns at w. Its axis y has the rate y' = w x y. The point is at s y + r p/|p| with p = k - (k·y) y, so
@@ -144,40 +144,6 @@ def rotation_of(b, many):
     """Rotation matrix of body or part b."""
     R = many.bodies.rotation
     return (R[b, 0], R[b, 1], R[b, 2], R[b, 3], R[b, 4], R[b, 5], R[b, 6], R[b, 7], R[b, 8])
-
-
-@inlined
-def _spin_of_owner(k, many):
-    """Angular velocity of the body whose face owns the normal of contact k, world frame; of a wall 0 [rad/s]."""
-    owner = many.contacts.owner[k]
-    return row_vector(many.bodies.twist, body_of(owner, many), 3) if owner >= 0 else (0.0, 0.0, 0.0)
-
-
-@kernel
-def rolling_rate(k, b, first, side, many):
-    """Velocity r' of the rolling point of part b in contact k, from the centre of the cylinder [m/s].
-
-    The face to which the point rolls turns at Ω. In its frame the cylinder turns at ω - Ω, and the face stays as it is;
-    the turn of that frame adds Ω x r. `first` is the column of the part's anchor; `side` is -1 for the first part of
-    the contact, 1 for the second.
-    """
-    R, place, n = rotation_of(b, many), many.contacts.anchor[k, first + 1], row_vector(many.contacts.frame, k, 0)
-    w, spin, way = row_vector(many.bodies.twist, body_of(b, many), 3), _spin_of_owner(k, many), times(side, n)
-    rate = _rolling_arm_rate(b, place, R, minus(w, spin), way, many)
-    return plus(rate, qt.cross(spin, rolling_arm(b, place, R, way, many)))
-
-
-@kernel
-def rolling_acceleration(k, b, first, side, many):
-    """Acceleration ω x r' of the body's point under the rolling point of part b in contact k [m/s²].
-
-    As the point moves over the body at δ = r' - ω x r, the gap to a face that turns at Ω gains -n·(Ω x δ), too. So the
-    whole is ω x r' - Ω x δ = (ω - Ω) x r' + Ω x (ω x r). Arguments are those of `rolling_rate`.
-    """
-    R, place, n = rotation_of(b, many), many.contacts.anchor[k, first + 1], row_vector(many.contacts.frame, k, 0)
-    w, spin = row_vector(many.bodies.twist, body_of(b, many), 3), _spin_of_owner(k, many)
-    around = qt.cross(w, rolling_arm(b, place, R, times(side, n), many))
-    return plus(qt.cross(minus(w, spin), rolling_rate(k, b, first, side, many)), qt.cross(spin, around))
 
 
 @inlined

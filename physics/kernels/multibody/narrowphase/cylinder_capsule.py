@@ -8,8 +8,6 @@ one whose place is known.
 
 from __future__ import annotations
 
-import math
-
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.segments import nearest_places, point_on_segment

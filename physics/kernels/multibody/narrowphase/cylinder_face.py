@@ -79,7 +79,9 @@ def _add_point(pair, feature, face, arm, limits, h, many):
     n, offset = face_plane(pair[1], face, many)
     p, (least, margin) = plus(place_between(pair, many), arm), limits
     gap = qt.dot(n, p) - offset
-    if gap > margin or not is_over(pair[1], face, p, pair_slop(body_of(pair[0], many), body_of(pair[1], many), many), many):
+    if gap > margin or not is_over(
+        pair[1], face, p, pair_slop(body_of(pair[0], many), body_of(pair[1], many), many), many
+    ):
         return math.inf
     gap = max(gap, least)
     add_of_pair(pair, feature, pair[1], n, (p, plus(p, times(-gap, n))), gap, h, many)
@@ -186,7 +188,8 @@ def add_outline(pair, face, end, limits, h, many):
 def add_flat_end(pair, face, end, limits, h, many):
     """Add the ring of an end that may lie flat on a face within h [s]: (least gap [m], whether it may).
 
-    An end that leans by more than 11 degrees does not count. Arguments are those of `add_outline`.
+    On another end one that leans by more than 11 degrees does not count: crossings of rims are found in one plane.
+    Arguments are those of `add_outline`.
     """
     can, other = pair
     n, offset = face_plane(other, face, many)
@@ -194,7 +197,7 @@ def add_flat_end(pair, face, end, limits, h, many):
     p, arm = across_axis(axis_of(R), n), rim_arm(can, end, R, times(-1.0, n), many)
     height = 2.0 * many.bodies.body[can].dims[0] * math.sqrt(qt.dot(p, p))
     gap = qt.dot(n, plus(place_between(pair, many), arm)) - offset
-    if gap > limits[1] or abs(qt.dot(n, axis_of(R))) < FLAT_COSINE:
+    if gap > limits[1] or (is_cylinder(other, many) and abs(qt.dot(n, axis_of(R))) < FLAT_COSINE):
         return math.inf, False
     if not may_lie_flat(can, end, other, n, arm, (gap, height), h, many):
         return math.inf, False

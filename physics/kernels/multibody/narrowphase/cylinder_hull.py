@@ -2,8 +2,8 @@
 
 The direction of the largest separation decides (`cylinder_separation`). Where a face of the polyhedron or an end of the
 cylinder separates as well as any other direction, up to a slop, the part above it touches (`cylinder_face`). Else one
-point touches: of the side or a rim at an edge, or at a corner. An edge along the side touches with both ends of the part
-beside it. Where the direction is nearly that of a face or end, by 11 degrees, the part above that touches, too.
+point touches: of the side or a rim at an edge, or at a corner. An edge along the side touches with both ends of the
+part beside it. Where the direction is nearly that of a face or end, by 11 degrees, the part above that touches, too.
 """
 
 from __future__ import annotations
@@ -24,9 +24,6 @@ from physics.kernels.multibody.data.cylinders import (
     rotation_of,
 )
 from physics.kernels.multibody.data.hull_tables import (
-    EDGE_END,
-    EDGE_START,
-    FIRST_CORNER,
     FIRST_EDGE,
     FIRST_FACE,
     LAST_EDGE,
@@ -44,7 +41,6 @@ from physics.kernels.multibody.narrowphase.cylinder_face import (
 from physics.kernels.multibody.narrowphase.cylinder_separation import (
     AT_CORNER,
     ON_END,
-    RIM_AND_EDGE,
     SIDE_AND_EDGE,
     best_face,
     best_of_others,
@@ -112,20 +108,31 @@ def _add_edge_along(pair, e, x, limits, h, many):
 
 
 @inlined
-def _edge_along(pair, kind, index, many):
-    """Edge of the polyhedron at the features of `best_of_others` that is most along the cylinder's axis, -1 if none."""
-    hulls, y, best, found = many.narrowphase.hulls, axis_of(rotation_of(pair[0], many)), _ALONG_COSINE, -1
-    first = hulls.of[pair[1], FIRST_EDGE]
-    for e in range(hulls.of[pair[1], LAST_EDGE] - first):
-        is_there = e == index
-        if kind == AT_CORNER:
-            is_there = hulls.edges[first + e, EDGE_START] == index or hulls.edges[first + e, EDGE_END] == index
-        if is_there:
-            _, d, _, _ = hull_edge(0, pair[1], e, many)
-            c = abs(qt.dot(d, y)) / math.sqrt(qt.dot(d, d))
-            if c > best:
-                best, found = c, e
+def _edge_along(pair, n, x, slop, many):
+    """Edge along the side that reaches farthest along n and is nearest to the cylinder's centre x; -1 if there is none.
+
+    The end that reaches farther may be a slop [m] behind the farthest corner.
+    """
+    y, nearest, found = axis_of(rotation_of(pair[0], many)), math.inf, -1
+    reach = farthest_corner(pair[1], n, many)[0] - slop
+    for e in range(many.narrowphase.hulls.of[pair[1], LAST_EDGE] - many.narrowphase.hulls.of[pair[1], FIRST_EDGE]):
+        p, d, _, _ = hull_edge(0, pair[1], e, many)
+        if abs(qt.dot(d, y)) < _ALONG_COSINE * math.sqrt(qt.dot(d, d)):
+            continue
+        w = across_axis(y, minus(x, p))
+        if qt.dot(w, w) < nearest and qt.dot(n, p) + max(0.0, qt.dot(n, d)) >= reach:
+            nearest, found = qt.dot(w, w), e
     return found
+
+
+@kernel
+def _add_along(pair, n, x, limits, h, many):
+    """Add both ends of an edge along the side, if one touches along n; return whether it does."""
+    slop = pair_slop(body_of(pair[0], many), body_of(pair[1], many), many)
+    if abs(qt.dot(n, axis_of(rotation_of(pair[0], many)))) > _FLAT_SINE:
+        return False
+    edge = _edge_along(pair, n, x, slop, many)
+    return edge >= 0 and _add_edge_along(pair, edge, x, limits, h, many) <= limits[0] + slop
 
 
 @kernel
@@ -133,12 +140,9 @@ def _add_single(pair, kind, index, n, x, limits, h, many):
     """Add the contact of the features that separate best, of the kind and number as of `best_of_others`."""
     (can, hull), hulls, R, least = pair, many.narrowphase.hulls, rotation_of(pair[0], many), limits[0]
     l, y = many.bodies.body[can].dims[1], axis_of(R)
-    edge, tilt = _edge_along(pair, kind, index, many), abs(qt.dot(n, y))
-    if edge >= 0 and tilt <= _FLAT_SINE:
-        low = _add_edge_along(pair, edge, x, limits, h, many)
-        if low <= least + pair_slop(body_of(can, many), body_of(hull, many), many):
-            return
-    if kind == AT_CORNER and tilt <= _SIDE_SINE:
+    if _add_along(pair, n, x, limits, h, many):
+        return
+    if kind == AT_CORNER and abs(qt.dot(n, y)) <= _SIDE_SINE:
         _add_beside(pair, BESIDE_FEATURE, row_vector(hulls.corner[0], index, 0), x, limits, h, many)
         return
     p = plus(x, cylinder_support_arm(many.bodies.body[can].dims, R, times(-1.0, n)))
@@ -147,6 +151,17 @@ def _add_single(pair, kind, index, n, x, limits, h, many):
         s, _, _ = nearest_places(x, times(l, y), q, v)
         p = plus(point_on_segment(x, times(l, y), s), times(-many.bodies.body[can].dims[0], n))
     add_of_pair(pair, SINGLE_FEATURE, -1, n, (p, plus(p, times(-least, n))), least, h, many)
+
+
+@kernel
+def _add_beyond_face(pair, face, x, limits, h, many):
+    """Add the contact of a cylinder that a face separates best, though no part of it is above the face."""
+    (can, hull), n = pair, row_vector(many.narrowphase.hulls.normal[0], face, 0)
+    if _add_along(pair, n, x, limits, h, many):
+        return
+    p = plus(x, cylinder_support_arm(many.bodies.body[can].dims, rotation_of(can, many), times(-1.0, n)))
+    q = nearest_on_face(0, hull, face, p, many)
+    add_of_pair(pair, SINGLE_FEATURE, -1, n, (plus(q, times(limits[0], n)), q), limits[0], h, many)
 
 
 @inlined
@@ -179,10 +194,7 @@ def collide_cylinder_hull(can, hull, margin, h, many):
     slop = pair_slop(body_of(can, many), body_of(hull, many), many)
     if further <= apart + slop:
         if add_on_face(pair, face, (apart, margin), h, many) > apart + slop:
-            m = row_vector(many.narrowphase.hulls.normal[0], face, 0)
-            p = plus(x, cylinder_support_arm(many.bodies.body[can].dims, rotation_of(can, many), times(-1.0, m)))
-            q = nearest_on_face(0, hull, face, p, many)
-            add_of_pair(pair, SINGLE_FEATURE, -1, m, (plus(q, times(apart, m)), q), apart, h, many)
+            _add_beyond_face(pair, face, x, (apart, margin), h, many)
         return
     limits = (further, margin)
     if kind == ON_END:

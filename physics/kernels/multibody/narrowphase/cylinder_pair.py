@@ -2,8 +2,8 @@
 
 The direction of the largest separation decides. It is that of an end, or that across both axes, or it leads from a rim
 to the other side (`rim_line`), or from rim to rim (`smooth_separation`). On an end the part of the other cylinder above
-it touches (`cylinder_face`). Sides that are nearly parallel touch with both ends of the part beside each other. Anything
-else touches with one point.
+it touches (`cylinder_face`). Sides that are nearly parallel touch with both ends of the part beside each other.
+Anything else touches with one point.
 """
 
 from __future__ import annotations
@@ -77,9 +77,7 @@ def best_between(pair, x, many):
     n = _across_both(y, z, x)
     best = round_separation(pair, x, n, many)
     for end in ends:
-        best, n = _better(
-            best, n, rim_line_normal(plus(x, times(end * one[1], y)), y, one[0], z), pair, x, many
-        )
+        best, n = _better(best, n, rim_line_normal(plus(x, times(end * one[1], y)), y, one[0], z), pair, x, many)
         m = rim_line_normal(minus(times(end * other[1], z), x), z, other[0], y)
         best, n = _better(best, n, times(-1.0, m), pair, x, many)
     for start in (between_cylinders(a, b, n, many), n):

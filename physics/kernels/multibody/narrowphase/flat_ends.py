@@ -130,6 +130,4 @@ def ring_arm(b, end, k, along, many):
     """Point k of the ring whose first point is `along`, from the centre of cylinder b, world frame [m]."""
     R, angle = row_matrix(many.bodies.rotation, b), 2.0 * math.pi * k / RING_POINTS
     across = qt.cross(axis_of(R), along)
-    return plus(
-        middle_of_end(b, end, R, many), plus(times(math.cos(angle), along), times(math.sin(angle), across))
-    )
+    return plus(middle_of_end(b, end, R, many), plus(times(math.cos(angle), along), times(math.sin(angle), across)))

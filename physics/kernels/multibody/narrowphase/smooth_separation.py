@@ -5,7 +5,7 @@ cylinder is smooth: for a unit vector n with the component c along the axis y, a
 
     s = l |c| + r |p|,    point: sign(c) l y + r p/|p|,    H = r/|p| t tᵀ  with  t = y x p/|p|.
 
-Of the directions from which it starts the best result counts, so that it is a lower bound of the separation in any case.
+Of the directions from which it starts the best result counts. It is a lower bound of the separation in any case.
 Vectors are in the world frame.
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import if_given, inlined, kernel
+from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.cylinder_balls import nearest_of_cylinder

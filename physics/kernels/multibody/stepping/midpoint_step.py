@@ -24,19 +24,17 @@ from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import follow_edges
 from physics.kernels.multibody.data.contact_set import (
     add_scaled,
-    may_roll,
     pair_slop,
     parted_slack,
     put_vector,
     relative_acceleration_bound,
-    rolls_on_rim,
     row_matrix,
     slip_velocity,
     subtract,
     update_contacts,
 )
 from physics.kernels.multibody.data.cylinder_balls import is_beside_cylinder, less_turn_beside_cylinder
-from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rolling_acceleration, rolling_rate
+from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
     moving_body_at,
@@ -51,6 +49,12 @@ from physics.kernels.multibody.data.parts import (
     first_part,
     plus_turning,
     second_part,
+)
+from physics.kernels.multibody.data.rolling_points import (
+    may_roll,
+    rolling_acceleration,
+    rolling_rate,
+    rolls_on_rim,
 )
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
