@@ -183,6 +183,13 @@ def test_a_capsule_along_a_cylinder_touches_with_both_ends_of_the_common_line():
     assert sorted(map(tuple, points.round(9))) == [(0, 0, -0.2), (0, 0, 0.3)]
 
 
+def test_a_capsule_across_an_end_touches_where_it_passes_the_rim():
+    capsule = physics.Capsule(0.05, 0.6, 1.0, pos=(0.06, 0.05, 0.1), quat=ALONG_Z)
+    points = points_of(capsule, physics.Cylinder(0.1, 0.4, 1.0, pos=(0, -0.2, 0)))
+    ends = points[[points[:, 2].argmin(), points[:, 2].argmax()]]  # a point between them does no harm
+    assert ends == pytest.approx(np.array([(0.06, 0, -0.08), (0.06, 0, 0.08)]), abs=1e-9)
+
+
 def test_two_ends_touch_with_points_of_the_lens_that_they_share():
     """Expect points inside both disks, and both crossings of the rims, at x = (d² + 0.1² - 0.2²)/(2 d)."""
     low = physics.Cylinder(0.1, 0.3, 1.0, pos=(0, -0.15, 0))

@@ -251,11 +251,11 @@ NARROWPHASE = [
     ),
     _mutant(
         "narrowphase-cylinder-capsule",
-        "A capsule that is longer than a cylinder does not touch at the end of its side.",
+        "A capsule across the end of a cylinder does not touch where it passes the rim.",
         "narrowphase/cylinder_capsule.py",
-        "if slope * slope > 0.0:",
-        "if slope * slope < 0.0:",
-        "kernels/test_cylinders.py::test_a_capsule_along_a_cylinder_touches_with_both_ends_of_the_common_line",
+        "if one <= two:",
+        "if one > two:",
+        "kernels/test_cylinders.py::test_a_capsule_across_an_end_touches_where_it_passes_the_rim",
     ),
     _mutant(
         "narrowphase-cylinder-ellipsoid",

@@ -1,9 +1,8 @@
 """Contacts of a cylinder and a capsule.
 
 A capsule touches with balls about points of its axis (`capsule_contacts`): about both ends, and about the points that
-are nearest to the side, to a rim, or at which the axis passes the outline of an end or the end of the side. Each ball
-touches the nearest point of the cylinder. A ball that touches elsewhere than its place suggests is left out, and so is
-one whose place is known.
+are nearest to the side or to a rim, or at which the axis passes the outline of an end. Each ball touches the nearest
+point of the cylinder. A ball near a rim that touches elsewhere is left out, and so is one whose place is known.
 """
 
 from __future__ import annotations
@@ -23,9 +22,9 @@ from physics.kernels.multibody.narrowphase.cylinder_face import add_of_pair
 from physics.kernels.multibody.narrowphase.plane_faces import part_over
 from physics.kernels.multibody.narrowphase.rim_line import rim_line_normal
 
-# Features of a contact: two ends of the axis; then its place nearest to the axis of the cylinder, to each rim, where it
-# passes each end of the side, and where it passes the outline of each end.
-_NEAR_SIDE, _NEAR_RIM, _PASSES_SIDE, _PASSES_END = 2, 3, 5, 7
+# Features of a contact: two ends of the axis; then its place nearest to the axis of the cylinder, those nearest to each
+# rim, and two where it passes the outline of each end.
+_NEAR_SIDE, _NEAR_RIM, _PASSES_END = 2, 3, 5
 
 
 @inlined
@@ -73,19 +72,14 @@ def _add_near_rim(pair, end, first, margin, h, many):
 
 @kernel
 def _add_passing(pair, end, first, margin, h, many):
-    """Add the balls where the axis passes the outline of an end, and where it passes the end of the side."""
+    """Add the balls where the axis passes the outline of an end."""
     can, capsule = pair
     x, u = row_vector(many.bodies.center, capsule, 0), half_axis(capsule, many)
-    y, way = axis_of(rotation_of(can, many)), minus(x, row_vector(many.bodies.center, can, 0))
+    way = minus(x, row_vector(many.bodies.center, can, 0))
     one, two, _, _ = part_over(can, end, minus(way, u), plus(way, u), 0.0, many)
     if one <= two:
         _add_ball(pair, _PASSES_END + 2 * end, 2.0 * one - 1.0, first, margin, h, many)
         _add_ball(pair, _PASSES_END + 2 * end + 1, 2.0 * two - 1.0, first, margin, h, many)
-    slope = qt.dot(y, u)
-    if slope * slope > 0.0:
-        s = ((2.0 * end - 1.0) * many.bodies.body[can].dims[1] - qt.dot(y, way)) / slope
-        if abs(s) < 1.0:
-            _add_ball(pair, _PASSES_SIDE + end, s, first, margin, h, many)
 
 
 @kernel
