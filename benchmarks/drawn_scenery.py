@@ -23,7 +23,7 @@ from physics.kernels.contact_law.materials import RULES
 from rigid_env.hard_cases.cases.driven_supports import ROOM
 from rigid_env.hard_cases.cases.random_draws import CELL, HALF_WIDTH, WALLS, directions, draw_wrench, log_uniform
 
-KINDS = ("block", "sphere", "ellipsoid", "capsule", "hull", "compound")
+KINDS = ("block", "sphere", "ellipsoid", "capsule", "cylinder", "hull", "compound")
 FURNITURE = 3
 FAR = -1e6  # offset of the walls that nothing touches, beyond a room [m]
 
@@ -90,6 +90,8 @@ def _body(rng: np.random.Generator, kind: str, **more) -> physics.Body:
         return physics.Ellipsoid((0.5 * a, 0.5 * b, 0.5 * c), **more)
     if kind == "capsule":
         return physics.Capsule(0.25 * a, 0.5 * b, **more)
+    if kind == "cylinder":
+        return physics.Cylinder(0.5 * a, b, **more)
     if kind == "hull":
         return physics.Hull(0.5 * directions(rng, (CORNERS,)) * (a, b, c), **more)
     own = {} if more.get("fixed") else {"mass": 1.0}
@@ -171,6 +173,8 @@ def _sizes(rng: np.random.Generator, bodies: Sequence[physics.Body], worlds: int
         elif body.kind == "capsule":
             size[:, b, 2] = size[:, b, 0]
             size[:, b, 1] += size[:, b, 0]
+        elif body.kind == "cylinder":
+            size[:, b, 2] = size[:, b, 0]
     return size
 
 

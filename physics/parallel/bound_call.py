@@ -90,6 +90,6 @@ def _tell(count: Callable[[], int], is_over: threading.Event) -> None:
     """
     while not is_over.wait(COMPILE_NOTICE):
         if count() > 0:
-            text = "rigid-env: compiling a kernel for this scene, ten seconds to a minute (it is kept for later runs) ..."
+            text = "rigid-env: compiling a kernel for this scene, in ten seconds to a minute (it is kept for later) ..."
             print(text, file=sys.stderr, flush=True)
             return

@@ -11,10 +11,11 @@ def polyhedra(bodies: tuple[Body, ...]) -> list:
     """Polyhedron of each body and part for `hull_tables.make_hulls`; an empty list if no pair needs them.
 
     A hull has its own polyhedron, a block the unit cube, a round body and a compound None. Hulls need them, and so do
-    capsules beside blocks. The parts of compounds follow behind all bodies.
+    capsules and cylinders beside blocks. The parts of compounds follow behind all bodies.
     """
     kinds = {body.kind for body in with_parts(bodies)}
-    return every_polyhedron(bodies) if "hull" in kinds or {"capsule", "block"} <= kinds else []
+    is_needed = "hull" in kinds or ("block" in kinds and kinds & {"capsule", "cylinder"})
+    return every_polyhedron(bodies) if is_needed else []
 
 
 def every_polyhedron(bodies: tuple[Body, ...]) -> list:

@@ -101,7 +101,7 @@ class BodyMemory(ContactMemory):
     def shape(self, scene: Scene, switches: Any, worlds: int) -> tuple[int, int]:
         parts, walls = part_count(scene.bodies), len(scene.walls)
         return worlds, allocation.warm_start_size(
-            parts, walls, polyhedra(scene.bodies), self._keeps_part, switches.laws
+            parts, walls, polyhedra(scene.bodies), self._keeps_part, switches.laws, switches.cylinders
         )
 
     def rows_per_world(self, bodies: int) -> int:

@@ -111,7 +111,9 @@ class ManyBodies(Scheme):
         if not self.is_error_controlled:
             return None
         bodies, parts, walls = len(scene.bodies), part_count(scene.bodies), len(scene.walls)
-        memory = allocation.warm_start_size(parts, walls, polyhedra(scene.bodies), laws=switches.laws)
+        memory = allocation.warm_start_size(
+            parts, walls, polyhedra(scene.bodies), laws=switches.laws, cylinders=switches.cylinders
+        )
         return allocation.make_snapshots(bodies, memory, switches.lone)
 
     def acting(self, accuracy: Accuracy) -> Accuracy:

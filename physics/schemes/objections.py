@@ -13,7 +13,6 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_TANGENTIAL,
 )
 from physics.scene.body_axes import axis_table
-from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
 from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
@@ -111,28 +110,12 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against a cylinder that may touch another body than a sphere, or has a torque of `RollingFriction`.
-
-    "" if there is neither.
-    """
+    """Message against a torque of `RollingFriction` or `SpinFriction` on a cylinder that moves; "" if there is none."""
     for b, body in enumerate(scene.bodies if {LAW_ROLLING, LAW_SPIN} & set(needs.laws) else ()):
         if not body.fixed and any(part.kind == "cylinder" for part in with_parts([body])):
             return (
                 f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in needs.laws else LAW_SPIN]}, but "
                 f"Scene.bodies[{b}] is or holds a cylinder, whose faces do not roll; allowed are spheres, "
                 "ellipsoids and capsules beside bodies without round parts"
-            )
-    if not (needs.meeting and needs.cylinders):
-        return ""
-    between = needs.contact.between_bodies
-    pairs = touching_pairs(scene, between)
-    pairs = potential_pairs(scene, between) if pairs is None else pairs
-    kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
-    for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
-        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
-            return (
-                f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; a cylinder touches walls "
-                "and spheres: allowed are Contact(between_bodies=False) where no fixed body is met, and groups that "
-                "keep both apart"
             )
     return ""

@@ -379,13 +379,6 @@ def test_a_cylinder_in_a_compound_moves_as_the_cylinder():
 # --- what it refuses -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("other", [physics.Block((1, 1, 1), 1.0), physics.Cylinder(0.1, 0.2, 1.0)])
-def test_bodies_that_touch_a_cylinder_are_refused_by_name(other):
-    scene = scene_of(physics.Cylinder(0.1, 0.3, 1.0, pos=(0, 3, 0)), other)
-    with pytest.raises(ValueError, match=r"Scene\.bodies\[0\] is or holds a cylinder, which may touch bodies\[1\]"):
-        physics.World(scene, dt=0.01)
-
-
 def test_groups_keep_a_cylinder_apart_from_bodies():
     """The ball and the block touch each other, and the cylinder passes through both."""
     can = physics.Cylinder(0.1, 0.2, 1.0, pos=(0, 0.4, 0), group=2, mask=4)

@@ -17,6 +17,9 @@ from physics.kernels.multibody.data.arrays import (
     BLOCK_SIZE,
     BLOCKS_PER_BODY,
     COLUMN_SIZE,
+    CYLINDER_FACE_CONTACTS,
+    CYLINDER_PAIR_CONTACTS,
+    CYLINDER_WALL_CONTACTS,
     ENTRIES_PER_BODY,
     LANES_SIZE,
     NORMAL_ROW_SIZE,
@@ -70,14 +73,18 @@ def bodies_setting_fields() -> list[tuple]:
     ]
 
 
-def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = ()) -> int:
+def contact_capacity(bodies: int, walls: int, polyhedra: Sequence = (), cylinders: bool | None = None) -> int:
     """Largest number of contacts in a world with these numbers of bodies and walls.
 
     `polyhedra` are the bodies as `make_hulls` takes them; empty if the world has no hulls. Parts of compounds count as
-    bodies.
+    bodies. `cylinders` says whether some of them are cylinders.
     """
     corners = max([VERTEX_COUNT, *(len(body.vertices) for body in polyhedra if body is not None)])
-    return bodies * walls * corners + pair_capacity(bodies) * max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
+    of_pair = max(PAIR_CONTACTS, clipped_face_capacity(polyhedra))
+    if cylinders:
+        corners, of_pair = max(corners, CYLINDER_WALL_CONTACTS), of_pair + CYLINDER_FACE_CONTACTS
+        of_pair = max(of_pair, CYLINDER_PAIR_CONTACTS)
+    return bodies * walls * corners + pair_capacity(bodies) * of_pair
 
 
 def pair_capacity(bodies: int) -> int:
@@ -96,14 +103,21 @@ def batch_capacity(bodies: int, contacts: int) -> int:
 
 
 def warm_start_size(
-    bodies: int, walls: int, polyhedra: Sequence = (), refined: bool = False, laws: tuple[str, ...] = ()
+    bodies: int,
+    walls: int,
+    polyhedra: Sequence = (),
+    refined: bool = False,
+    laws: tuple[str, ...] = (),
+    cylinders: bool | None = None,
 ) -> int:
     """Number of columns of a world's row of `memory`, the warm start (`arrays.WARM_CONTACT_ID`, ...).
 
-    `bodies` and `polyhedra` are as in `contact_capacity`. `refined` says that substeps have error control, which keeps
-    one number more. `laws` are those of the scene: rolling and spin friction keep a torque for each contact.
+    `bodies`, `polyhedra` and `cylinders` are as in `contact_capacity`. `refined` says that substeps have error control,
+    which keeps one number more. `laws` are those of the scene: rolling and spin friction keep a torque for each
+    contact.
     """
-    return WARM_HEADER_SIZE + warm_contact_size(laws) * contact_capacity(bodies, walls, polyhedra) + int(refined)
+    room = contact_capacity(bodies, walls, polyhedra, cylinders)
+    return WARM_HEADER_SIZE + warm_contact_size(laws) * room + int(refined)
 
 
 def warm_contact_size(laws: tuple[str, ...] = ()) -> int:
@@ -167,7 +181,7 @@ def make_bodies_workspace(
     """
     parts, capsules, cylinders = (settings.pop(name, None) for name in ("parts", "capsules", "cylinders"))
     parts = parts or ()
-    contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra)
+    contacts = contact_capacity(bodies + len(parts), len(walls), polyhedra, cylinders)
     laws = settings.pop("laws", ())
     fields = body_fields(terms, laws, materials[0])
     made = _make_bodies(bodies, fields, materials[0], settings.pop("relative_slop"), fixed, groups, parts)

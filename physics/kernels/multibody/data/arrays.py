@@ -37,6 +37,14 @@ PRE_LOAD_VELOCITY, LOADED_MOMENTA = 0, 6
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
 PAIR_CONTACTS = 8
 
+# Contacts of a cylinder: with a wall, two rings with their lowest points; besides the outline of a face, a ring, its
+# lowest point and two ends of a line; with another cylinder two of these rings and two crossings of rims.
+CYLINDER_WALL_CONTACTS, CYLINDER_FACE_CONTACTS, CYLINDER_PAIR_CONTACTS = 18, 12, 24
+
+# Room for feature numbers of one pair (two bodies, or a body and a wall) in the id of a contact. Pairs with a hull may
+# have more features.
+FEATURES_PER_PAIR = 512
+
 # Room for near pairs, per body: at most twelve equal spheres touch one, and each pair belongs to two bodies.
 PAIRS_PER_BODY = 8
 

@@ -9,12 +9,12 @@ from physics.kernels.contact_law.materials import friction_at, restitution_at
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
+from physics.kernels.multibody.data.arrays import FEATURES_PER_PAIR, NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
-from physics.kernels.multibody.data.cylinder_balls import normal_beside_cylinder
-from physics.kernels.multibody.data.cylinders import ROLLING_FEATURES, is_cylinder, rim_arm
+from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
+from physics.kernels.multibody.data.cylinders import is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.grain import grain_tangents
@@ -28,11 +28,8 @@ from physics.kernels.multibody.data.parts import (
     note_parts,
     second_part,
 )
+from physics.kernels.multibody.data.rolling_points import rolls_on_rim
 from physics.kernels.state.layout import ELLIPSOID, SPHERE
-
-# Room for feature numbers of one pair (two bodies, or a body and a wall) in the id of a contact. Pairs with a hull may
-# have more features.
-FEATURES_PER_PAIR = 512
 
 # Owner of a contact whose normal is that of a plane between two bodies that pass each other (`stepping.passing_pairs`).
 PARTED = -2
@@ -371,26 +368,12 @@ def add_ordered_contact(a, b, first, n, on_first, on_second, gap, h, many):
 
 
 @inlined
-def rolls_on_rim(k, b, many):
-    """True if body or part b is a cylinder whose point in contact k, with a wall, rolls along a rim."""
-    is_at_wall = is_cylinder(b, many) and body_at(many.contacts.bodies[k, 1], many) < 0
-    return is_at_wall and many.contacts.id[k] % FEATURES_PER_PAIR < ROLLING_FEATURES
-
-
-@if_given("many.bodies.cylinders", False)
-def may_roll(k, many):
-    """True if the point of contact k rolls along a rim of a cylinder."""
-    return rolls_on_rim(k, first_part(k, many), many)
-
-
-@inlined
 def _carried_point(b, k, first, side, n, many):
     """Arm of a body in contact k after its motion since the contact was found, at its part b, world frame [m].
 
     A block or hull carries the point along. On a sphere or ellipsoid it is the point with the present normal n of the
     contact, and so it is on the ball of a capsule, whose centre the capsule carries along. `first` is the column of the
-    body's anchor; `side` is -1 for the first body and 1 for the second. On a rim of a cylinder it may roll
-    (`cylinders`).
+    body's anchor; `side` is -1 for the first body and 1 for the second. On a cylinder it may roll (`cylinders`).
     """
     shape, d = many.bodies.body[b].shape, many.bodies.body[b].dims
     if shape == SPHERE:
@@ -400,9 +383,10 @@ def _carried_point(b, k, first, side, n, many):
         dims, R, m = (d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), (-side * n[0], -side * n[1], -side * n[2])
         return from_body(b, geo.support_arm(shape, dims, R, m, geo.scaled_normal(shape, dims, R, m)), many)
     if rolls_on_rim(k, b, many):
-        end = many.contacts.id[k] % FEATURES_PER_PAIR
-        arm = rim_arm(b, end, row_matrix(many.bodies.rotation, b), (side * n[0], side * n[1], side * n[2]), many)
-        return from_body(b, arm, many)
+        way, place = (side * n[0], side * n[1], side * n[2]), many.contacts.anchor[k, first + 1]
+        return from_body(b, rolling_arm(b, place, row_matrix(many.bodies.rotation, b), way, many), many)
+    if is_beside_cylinder(k, b, first, many):
+        return from_body(b, add_scaled(ball_arm(k, b, first, many), side * d[0], n), many)
     arm = qt.matvec(row_matrix(many.bodies.rotation, b), row_vector(many.contacts.anchor, k, first))
     return from_body(b, add_scaled(arm, side * d[0], n) if is_capsule(b, many) else arm, many)
 
@@ -430,11 +414,11 @@ def _turn_frame(k, a, b, many):
         if size > 0.0:
             n = (d[0] / size, d[1] / size, d[2] / size)
             write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
-        n = normal_between_axes(k, a, b, n, many)
-        write_contact_frame(k, n, many)
     elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
         n = normal_beside_cylinder(k, a, b, n, many)
+        write_contact_frame(k, n, many)
+    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
+        n = normal_between_axes(k, a, b, n, many)
         write_contact_frame(k, n, many)
     else:
         turn_grain(k, n, many)

@@ -1,7 +1,9 @@
 """Contacts of a cylinder and a ball: the nearest point of the cylinder to a point, and how the normal turns.
 
 The gap is the distance φ of the ball's centre from the cylinder, less its radius. The point of the cylinder slides over
-its surface so that it stays the nearest one.
+its surface so that it stays the nearest one. The ball is a sphere, one about a point of a capsule's axis, or a point of
+a polyhedron beside the side of the cylinder, of which its body carries the centre along. Where two sides are beside
+each other, it is a ball about a point of the second axis.
 """
 
 from __future__ import annotations
@@ -11,15 +13,17 @@ import math
 from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, plus, row_vector, times
-from physics.kernels.multibody.data.cylinders import is_cylinder
-from physics.kernels.multibody.data.parts import body_of, center_velocity
+from physics.kernels.multibody.data.arrays import FEATURES_PER_PAIR
+from physics.kernels.multibody.data.capsules import is_capsule
+from physics.kernels.multibody.data.cylinders import (
+    BESIDE_FEATURE,
+    SINGLE_FEATURE,
+    axis_of,
+    is_cylinder,
+    rotation_of,
+)
+from physics.kernels.multibody.data.parts import body_of, center_velocity, first_part
 from physics.kernels.state.layout import SPHERE
-
-
-@inlined
-def _rotation(b, many):
-    R = many.bodies.rotation
-    return (R[b, 0], R[b, 1], R[b, 2], R[b, 3], R[b, 4], R[b, 5], R[b, 6], R[b, 7], R[b, 8])
 
 
 @inlined
@@ -34,7 +38,8 @@ def _from_side_and_end(dims, y):
 def nearest_in_frame(dims, y):
     """Nearest point of the surface of a cylinder to a point y: (distance, n, point), all in the frame of the cylinder.
 
-    `dims` are its half extents. The distance is negative inside, where n leads the shortest way out.
+    `dims` are its half extents, of which half the length may be infinite. The distance is negative inside, where n
+    leads the shortest way out.
     """
     side, end, out = _from_side_and_end(dims, y)
     sign = math.copysign(1.0, y[1])
@@ -48,27 +53,60 @@ def nearest_in_frame(dims, y):
 
 
 @inlined
-def _nearest(can, x, many):
-    """Do the work of `nearest_in_frame` for cylinder `can` and a point x; the normal is in the world frame."""
-    d, R = many.bodies.body[can].dims, _rotation(can, many)
+def _nearest(can, x, is_beside, many):
+    """Do the work of `nearest_in_frame` for cylinder `can` and a point x; the normal is in the world frame.
+
+    If `is_beside`, it is the nearest point of the side, which goes on beyond the ends.
+    """
+    d, R = many.bodies.body[can].dims, rotation_of(can, many)
     y = qt.transposed_matvec(R, minus(x, row_vector(many.bodies.center, can, 0)))
-    distance, n, p = nearest_in_frame((d[0], d[1], d[2]), y)
+    distance, n, p = nearest_in_frame((d[0], math.inf if is_beside else d[1], d[2]), y)
     return distance, qt.matvec(R, n), p
 
 
 @kernel
 def nearest_of_cylinder(can, x, many):
     """Nearest point of the surface of cylinder `can` to a point x: (distance, n out of it, point); negative inside."""
-    distance, n, p = _nearest(can, x, many)
-    return distance, n, plus(row_vector(many.bodies.center, can, 0), qt.matvec(_rotation(can, many), p))
+    distance, n, p = _nearest(can, x, False, many)
+    return distance, n, plus(row_vector(many.bodies.center, can, 0), qt.matvec(rotation_of(can, many), p))
 
 
 @inlined
-def _has_ball(a, b, many):
-    """True if one of the parts a and b is a cylinder and the other one a sphere."""
-    return (is_cylinder(a, many) and many.bodies.body[b].shape == SPHERE) or (
-        is_cylinder(b, many) and many.bodies.body[a].shape == SPHERE
-    )
+def _is_beside(k, many):
+    """True if contact k is that of a point of a polyhedron beside the side of a cylinder."""
+    return BESIDE_FEATURE <= many.contacts.id[k] % FEATURES_PER_PAIR < SINGLE_FEATURE
+
+
+@inlined
+def _cylinder_and_ball(k, a, b, many):
+    """Find (cylinder, ball) among parts a and b of contact k, or (-1, -1) if they are no such pair."""
+    can, ball = a, b
+    if not is_cylinder(a, many):
+        can, ball = b, a
+    is_ball = is_cylinder(can, many) and many.contacts.owner[k] == -1
+    is_ball = is_ball and (many.bodies.body[ball].shape == SPHERE or is_capsule(ball, many) or _is_beside(k, many))
+    return (can, ball) if is_ball else (-1, -1)
+
+
+@inlined
+def ball_arm(k, ball, first, many):
+    """Centre of the ball of contact k from the centre of its part, world frame [m]; `first` is its anchor's column."""
+    if many.bodies.body[ball].shape == SPHERE:
+        return (0.0, 0.0, 0.0)
+    if is_cylinder(ball, many):
+        return times(many.contacts.anchor[k, first + 1], axis_of(rotation_of(ball, many)))
+    return qt.matvec(rotation_of(ball, many), row_vector(many.contacts.anchor, k, first))
+
+
+@if_given("many.bodies.cylinders", False)
+def is_beside_cylinder(k, b, first, many):
+    """True if part b is the second one of two cylinders whose sides are beside each other in contact k.
+
+    `first` is the column of its anchor. Its point stays under a point of its axis, as that of a capsule.
+    """
+    if first == 0 or not (is_cylinder(b, many) and many.contacts.owner[k] == -1 and _is_beside(k, many)):
+        return False
+    return is_cylinder(first_part(k, many), many)
 
 
 def _same_normal(k, a, b, n, many):
@@ -77,39 +115,40 @@ def _same_normal(k, a, b, n, many):
 
 @if_given("many.bodies.cylinders", _same_normal)
 def normal_beside_cylinder(k, a, b, n, many):
-    """Normal of contact k in the present poses of parts a and b, if they are a cylinder and a sphere, else n.
+    """Normal of contact k in the present poses of parts a and b, if they are a cylinder and a ball, else n.
 
     The anchor of the cylinder moves to its nearest point.
     """
-    if not _has_ball(a, b, many):
+    can, ball = _cylinder_and_ball(k, a, b, many)
+    if can < 0:
         return n
-    is_first = is_cylinder(a, many)
-    can, ball, first = (a, b, 0) if is_first else (b, a, 3)
-    _, m, p = _nearest(can, row_vector(many.bodies.center, ball, 0), many)
+    first, other = (0, 3) if can == a else (3, 0)
+    x = plus(row_vector(many.bodies.center, ball, 0), ball_arm(k, ball, other, many))
+    _, m, p = _nearest(can, x, _is_beside(k, many), many)
     for c in range(3):
         many.contacts.anchor[k, first + c] = p[c]
-    return times(-1.0, m) if is_first else m
+    return times(-1.0, m) if can == a else m
 
 
 @kernel
-def _turn_beside(can, ball, many):
+def _turn_beside(can, ball, arm, is_beside, many):
     """Acceleration of the gap of a ball besides those of the points of both bodies [m/s²].
 
-    In the frame of the cylinder, which turns at ω, the ball's centre has the velocity u. The distance φ of the centre
-    has the gradient n, and in u the second derivative n_r u_t²/ρ + u_m²/φ. Here t is along the rim, ρ the distance from
-    the axis, n_r the part of n across the axis, and m across n and t. On the side the first term is left, with n_r = 1,
-    and on an end none. Coriolis and centrifugal accelerations of the centre, φ n from the nearest point, are
-    -2 n·(ω x u) and φ (ω² - (n·ω)²).
+    `arm` leads to the ball's centre from that of its part. In the frame of the cylinder, which turns at ω, the centre
+    has the velocity u. Its distance φ has the gradient n, and in u the second derivative n_r u_t²/ρ + u_m²/φ. Here t is
+    along the rim, ρ the distance from the axis, n_r the part of n across the axis, and m across n and t. On the side
+    the first term is left, with n_r = 1, and on an end none. Coriolis and centrifugal accelerations of the centre, φ n
+    from the nearest point, are -2 n·(ω x u) and φ (ω² - (n·ω)²).
     """
-    b, d, R = body_of(can, many), many.bodies.body[can].dims, _rotation(can, many)
-    w, rho = (
-        row_vector(many.bodies.twist, b, 3),
-        minus(row_vector(many.bodies.center, ball, 0), row_vector(many.bodies.center, can, 0)),
-    )
-    u = minus(minus(center_velocity(ball, many), center_velocity(can, many)), qt.cross(w, rho))
+    b, d, R = body_of(can, many), many.bodies.body[can].dims, rotation_of(can, many)
+    dims = (d[0], math.inf if is_beside else d[1], d[2])
+    w, x = row_vector(many.bodies.twist, b, 3), plus(row_vector(many.bodies.center, ball, 0), arm)
+    rho = minus(x, row_vector(many.bodies.center, can, 0))
+    v = plus(center_velocity(ball, many), qt.cross(row_vector(many.bodies.twist, body_of(ball, many), 3), arm))
+    u = minus(minus(v, center_velocity(can, many)), qt.cross(w, rho))
     y, u, w = qt.transposed_matvec(R, rho), qt.transposed_matvec(R, u), qt.transposed_matvec(R, w)
-    distance, n, _ = nearest_in_frame((d[0], d[1], d[2]), y)
-    side, end, out = _from_side_and_end(d, y)
+    distance, n, _ = nearest_in_frame(dims, y)
+    side, end, out = _from_side_and_end(dims, y)
     bent = 0.0
     if side > 0.0 or side > end:
         along = out[0] * u[2] - out[2] * u[0]
@@ -130,9 +169,12 @@ def _same_target(k, a, b, time, target, many):
 def less_turn_beside_cylinder(k, a, b, time, target, many):
     """Target velocity of contact k, less `time` [s] times the acceleration by which the normal's turn opens the gap.
 
-    It is the same target unless parts a and b, which is below 0 for a wall, are a cylinder and a sphere.
+    It is the same target unless parts a and b, which is below 0 for a wall, are a cylinder and a ball.
     """
-    if b < 0 or not _has_ball(a, b, many):
+    if b < 0:
         return target
-    can, ball = (a, b) if is_cylinder(a, many) else (b, a)
-    return (target[0] - time * _turn_beside(can, ball, many), target[1], target[2])
+    can, ball = _cylinder_and_ball(k, a, b, many)
+    if can < 0:
+        return target
+    arm = ball_arm(k, ball, 3 if can == a else 0, many)
+    return (target[0] - time * _turn_beside(can, ball, arm, _is_beside(k, many), many), target[1], target[2])

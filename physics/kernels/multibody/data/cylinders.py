@@ -1,11 +1,14 @@
-"""Cylinders: their support function, and the rim point that is nearest to a plane, which rolls along the rim.
+"""Cylinders: their support function, and points that roll over their surface, on a plane.
 
-The dimensions of a cylinder are its half extents (r, l, r), with its axis along body y. Its two rims are circles of
-radius r about the ends of the axis. Contacts of a cylinder have two kinds of points, told by their feature:
+The dimensions of a cylinder are its half extents (r, l, r), with its axis along body y. Contacts of a cylinder have
+kinds of points, told by their feature, a number:
 
-- 0 and 1 are the points of the lower and the upper rim that reach farthest towards the other body. They roll along the
-  rim as the cylinder turns.
-- Others are fixed in the body.
+- Those below `ROLLING_FEATURES` belong to the points of a cross-section that reach farthest towards a wall, or towards
+  a flat face that owns the contact's normal. They roll along their circle as the cylinder turns. Features 0 and 1 are
+  those of the lower and the upper rim; others are where the line of contact of the side ends over an edge of a face.
+- `BESIDE_FEATURE` and the next one belong to points of a polyhedron beside the side, which slides over them
+  (`cylinder_balls`).
+- All others are fixed in their bodies.
 
 All of this is left out of kernels whose scene has no cylinder.
 """
@@ -20,8 +23,27 @@ from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.parts import body_of
 from physics.kernels.state.layout import CYLINDER
 
-# Features of a contact of a cylinder below this number are rolling points: 0 of the lower rim, 1 of the upper one.
-ROLLING_FEATURES = 2
+# Sides of a face of a polyhedron, at most.
+_MAX_SIDES = 64
+
+# Points of the ring of a face, which carry the load of a cylinder that stands.
+RING_POINTS = 8
+
+# Features of a contact of a cylinder. First rolling points: of the lower and the upper rim, then those over the sides
+# of a face, from `CLIPPED_FEATURE` on.
+CLIPPED_FEATURE = 2
+ROLLING_FEATURES = CLIPPED_FEATURE + _MAX_SIDES
+
+# Points of the rings of both ends; the lowest point of either rim where it is not one of them; corners of a polyhedron
+# on an end; two crossings of each side of a face with a rim.
+RING_FEATURE = ROLLING_FEATURES
+LOWEST_FEATURE = RING_FEATURE + 2 * RING_POINTS
+CORNER_FEATURE = LOWEST_FEATURE + 2
+CROSSING_FEATURE = CORNER_FEATURE + _MAX_SIDES
+
+# Points of a polyhedron beside the side, of which two touch if an edge lies along it; any other single contact.
+BESIDE_FEATURE = CROSSING_FEATURE + 2 * _MAX_SIDES
+SINGLE_FEATURE = BESIDE_FEATURE + 2
 
 # Square of the sine of the tilt of a cylinder below which no rim point is the lowest: rounding of unit vectors.
 _LEAST_SINE_SQUARED = 1.0e-30
@@ -82,34 +104,46 @@ def cylinder_support_arm(dims, R, k):
 
 
 @inlined
-def rim_arm(b, end, R, k, many):
-    """Point of a rim of cylinder b that reaches farthest along the unit vector k, from its centre, world frame [m].
+def rolling_arm(b, place, R, k, many):
+    """Point of a cross-section of cylinder b that reaches farthest along the unit vector k, from its centre [m].
 
-    `end` is 0 for the lower rim, 1 for the upper one. Where all points of the rim reach equally far, it is the centre
-    of the rim.
+    `place` is that of the cross-section on the axis, from the centre [m]; vectors are in the world frame. Where all
+    points of the circle reach equally far, it is the centre of the circle.
     """
-    d, y = many.bodies.body[b].dims, axis_of(R)
-    arm, p = times((2.0 * end - 1.0) * d[1], y), across_axis(y, k)
+    arm, p = times(place, axis_of(R)), across_axis(axis_of(R), k)
     square = qt.dot(p, p)
-    return plus(arm, times(d[0] / math.sqrt(square), p)) if square > _LEAST_SINE_SQUARED else arm
+    return plus(arm, times(many.bodies.body[b].dims[0] / math.sqrt(square), p)) if square > _LEAST_SINE_SQUARED else arm
 
 
 @inlined
-def rim_arm_rate(b, end, R, w, k, many):
-    """Velocity of the point of `rim_arm`, as it rolls along the rim while k stays as it is [m/s].
+def rim_arm(b, end, R, k, many):
+    """Point of the lower (0) or upper (1) rim of cylinder b that reaches farthest along k; see `rolling_arm`."""
+    return rolling_arm(b, (2.0 * end - 1.0) * many.bodies.body[b].dims[1], R, k, many)
 
-    The cylinder turns at w. Its axis y has the rate y' = w x y. The point is at ±l y + r p/|p| with p = k - (k·y) y,
-    so that p' = -(k·y') y - (k·y) y' and (p/|p|)' is the part of p'/|p| across p.
+
+@inlined
+def rolling_arm_rate(b, place, R, w, k, many):
+    """Velocity of the point of `rolling_arm`, as it rolls along its circle while k stays as it is [m/s].
+
+    The cylinder turns at w. Its axis y has the rate y' = w x y. The point is at s y + r p/|p| with p = k - (k·y) y, so
+    that p' = -(k·y') y - (k·y) y' and (p/|p|)' is the part of p'/|p| across p.
     """
     d, y = many.bodies.body[b].dims, axis_of(R)
     turn = qt.cross(w, y)
-    rate, p = times((2.0 * end - 1.0) * d[1], turn), across_axis(y, k)
+    rate, p = times(place, turn), across_axis(y, k)
     square = qt.dot(p, p)
     if not square > _LEAST_SINE_SQUARED:
         return rate
     change = minus(times(-qt.dot(k, turn), y), times(qt.dot(k, y), turn))
     change = minus(change, times(qt.dot(change, p) / square, p))
     return plus(rate, times(d[0] / math.sqrt(square), change))
+
+
+@inlined
+def rotation_of(b, many):
+    """Rotation matrix of body or part b."""
+    R = many.bodies.rotation
+    return (R[b, 0], R[b, 1], R[b, 2], R[b, 3], R[b, 4], R[b, 5], R[b, 6], R[b, 7], R[b, 8])
 
 
 @inlined

@@ -45,7 +45,7 @@ def _collide_with_wall(b, wall, margin, h, hulls, many):
 @kernel
 def _collide(a, b, margin, h, ellipsoids, hulls, many):
     """Add the contacts of two bodies or parts whose gaps are at most `margin` [m]."""
-    if collide_cylinder(a, b, margin, h, many) or collide_capsule(a, b, margin, h, ellipsoids, many):
+    if collide_cylinder(a, b, margin, h, ellipsoids, many) or collide_capsule(a, b, margin, h, ellipsoids, many):
         return
     first, second = many.bodies.body[a].shape, many.bodies.body[b].shape
     if hulls is not None:

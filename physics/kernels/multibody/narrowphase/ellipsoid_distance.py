@@ -72,7 +72,7 @@ def ellipsoid_support_point(D, n):
 
 
 @inlined
-def _support_hessian(D, s, p):
+def support_hessian(D, s, p):
     """Second derivative of an ellipsoid's support function, as (00, 01, 02, 11, 12, 22).
 
     D is the ellipsoid's matrix; (s, p) are the results of `ellipsoid_support_point`.
@@ -128,7 +128,7 @@ def _unit(x, y, z):
 
 
 @inlined
-def _newton_direction(H, g, n, k0, k1, k2):
+def newton_direction(H, g, n, k0, k1, k2):
     """Solve (H + tr(H) n nᵀ) δ = g for δ, in the components i with kᵢ = 1; the others are 0.
 
     H is symmetric, as (00, 01, 02, 11, 12, 22), and g ⟂ n. The term with n makes the matrix regular.
@@ -196,7 +196,7 @@ def max_separation_direction(A, is_block, B, dims, d, n):
     best = support_separation(A, is_block, B, dims, d, n)
     for _ in range(_NEWTON_STEPS):
         s, p = ellipsoid_support_point(A, n)
-        H = _support_hessian(A, s, p)
+        H = support_hessian(A, s, p)
         g = (d[0] - p[0], d[1] - p[1], d[2] - p[2])
         k0 = k1 = k2 = 1.0
         if is_block:
@@ -211,18 +211,18 @@ def max_separation_direction(A, is_block, B, dims, d, n):
         else:
             r, q = ellipsoid_support_point(B, n)
             g = (g[0] - q[0], g[1] - q[1], g[2] - q[2])
-            K = _support_hessian(B, r, q)
+            K = support_hessian(B, r, q)
             H = (H[0] + K[0], H[1] + K[1], H[2] + K[2], H[3] + K[3], H[4] + K[4], H[5] + K[5])
         apart, along = max(best, 0.0), qt.dot(g, n)
         H = (H[0] + apart, H[1], H[2], H[3] + apart, H[4], H[5] + apart)
         g = (k0 * (g[0] - along * n[0]), k1 * (g[1] - along * n[1]), k2 * (g[2] - along * n[2]))
-        e = _newton_direction(H, g, n, k0, k1, k2)
+        e = newton_direction(H, g, n, k0, k1, k2)
         if is_block:  # at a kink the step must go to the side for which the gradient was taken; else n stays there
             k0 = 0.0 if n[0] == 0.0 and e[0] * g[0] < 0.0 else k0
             k1 = 0.0 if n[1] == 0.0 and e[1] * g[1] < 0.0 else k1
             k2 = 0.0 if n[2] == 0.0 and e[2] * g[2] < 0.0 else k2
             g = (k0 * g[0], k1 * g[1], k2 * g[2])
-            e = _newton_direction(H, g, n, k0, k1, k2)
+            e = newton_direction(H, g, n, k0, k1, k2)
         if not max(abs(e[0]), abs(e[1]), abs(e[2])) > _DIRECTION_TOLERANCE:
             break
         found, n, best = _search_along(A, is_block, B, dims, d, n, e, best)

@@ -24,7 +24,7 @@ CLIP_SIDE_OFFSET = 64
 
 
 @inlined
-def _side_plane(which, ring, k, first, last, out, hulls):
+def side_plane(which, ring, k, first, last, out, hulls):
     """Plane through side k of a face and along the face's normal `out`: (outward unit normal m, offset m·x).
 
     The face belongs to body `which` of the pair; its corners are `ring[first:last]`.
@@ -70,7 +70,7 @@ def _clip_polygon(source, count, m, bound, side, slop, hulls):
 
 
 @inlined
-def _has_corner(f, corner, hulls):
+def has_corner(f, corner, hulls):
     """True if face f of the tables has this corner, counted from 0 in its polyhedron."""
     for k in range(hulls.loops[f, 0], hulls.loops[f, 1]):
         if hulls.ring[k] == corner:
@@ -94,7 +94,7 @@ def write_hull_incident_face(which, o, out, many):
     first, face, best = hulls.of[o, FIRST_FACE], 0, math.inf
     for f in range(hulls.of[o, LAST_FACE] - first):
         c = qt.dot(out, row_vector(hulls.normal[which], f, 0))
-        if c < best and _has_corner(first + f, deepest, hulls):
+        if c < best and has_corner(first + f, deepest, hulls):
             best, face = c, f
     start, stop = hulls.loops[first + face, 0], hulls.loops[first + face, 1]
     for k in range(stop - start):
@@ -116,6 +116,6 @@ def clip_incident_face(which, r, o, face, slop, many):
     k = hulls.of[r, FIRST_FACE] + face
     first, last = hulls.loops[k, 0], hulls.loops[k, 1]
     for side in range(last - first):
-        m, bound = _side_plane(which, hulls.ring, side, first, last, out, hulls)
+        m, bound = side_plane(which, hulls.ring, side, first, last, out, hulls)
         source, count = _clip_polygon(source, count, m, bound, CLIP_SIDE_OFFSET + side, slop, hulls)
     return source, count

@@ -23,21 +23,18 @@ from physics.kernels.multibody.data.capsule_axes import less_turn_of_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import follow_edges
 from physics.kernels.multibody.data.contact_set import (
-    FEATURES_PER_PAIR,
     add_scaled,
-    may_roll,
     pair_slop,
     parted_slack,
     put_vector,
     relative_acceleration_bound,
-    rolls_on_rim,
     row_matrix,
     slip_velocity,
     subtract,
     update_contacts,
 )
-from physics.kernels.multibody.data.cylinder_balls import less_turn_beside_cylinder
-from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn, rim_arm_rate
+from physics.kernels.multibody.data.cylinder_balls import is_beside_cylinder, less_turn_beside_cylinder
+from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn
 from physics.kernels.multibody.data.driven_bodies import (
     driven_work,
     moving_body_at,
@@ -52,6 +49,12 @@ from physics.kernels.multibody.data.parts import (
     first_part,
     plus_turning,
     second_part,
+)
+from physics.kernels.multibody.data.rolling_points import (
+    may_roll,
+    rolling_acceleration,
+    rolling_rate,
+    rolls_on_rim,
 )
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
@@ -114,14 +117,12 @@ def _centripetal(b, k, first, side, h, many):
         _, rate = ellipsoid_point_and_rate((d[0], d[1], d[2]), row_matrix(many.bodies.rotation, b), w, n)
         return plus_turning(b, qt.cross(w, rate), many)
     if rolls_on_rim(k, b, many):
-        end, n = many.contacts.id[k] % FEATURES_PER_PAIR, row_vector(many.contacts.frame, k, 0)
-        n = (side * n[0], side * n[1], side * n[2])
-        rate = rim_arm_rate(b, end, row_matrix(many.bodies.rotation, b), w, n, many)
+        rate = rolling_rate(k, b, first, side, many)
         if qt.dot(rate, rate) * h * h > (MAX_TARGET_TURN * many.bodies.body[b].radius) ** 2:
             return (0.0, 0.0, 0.0)
-        return plus_free_turn(k, b, first, plus_turning(b, qt.cross(w, rate), many), many)
+        return plus_free_turn(k, b, first, plus_turning(b, rolling_acceleration(k, b, first, side, many), many), many)
     arm = row_vector(many.contacts.arm, k, first)
-    if is_capsule(b, many):
+    if is_capsule(b, many) or is_beside_cylinder(k, b, first, many):
         arm = add_scaled(arm, -side * many.bodies.body[b].dims[0], row_vector(many.contacts.frame, k, 0))
     return plus_free_turn(k, b, first, qt.cross(w, qt.cross(w, arm)), many)
 

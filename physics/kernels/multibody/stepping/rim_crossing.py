@@ -26,7 +26,9 @@ from physics.kernels.multibody.data.contact_set import (
     row_matrix,
 )
 from physics.kernels.multibody.data.driven_bodies import driven_velocity
+from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
+from physics.kernels.multibody.data.rolling_points import plus_rolling
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
 from physics.kernels.state import layout as at
 
@@ -82,7 +84,9 @@ def _time_on_face(k, many):
     a, owner = many.contacts.bodies[k, 0], many.contacts.owner[k]
     u = minus(relative_velocity(k, many.bodies.twist, many), driven_velocity(k, many))
     if owner == a:
-        u = (-u[0], -u[1], -u[2])
+        u = plus_rolling(k, body_at(many.contacts.bodies[k, 1], many), 3, 1.0, (-u[0], -u[1], -u[2]), many)
+    else:
+        u = plus_rolling(k, a, 0, -1.0, u, many)
     arm = row_vector(many.contacts.arm, k, 0)
     point = minus(row_vector(many.bodies.center, owner, 0), row_vector(many.bodies.state, a, at.POS))
     R, n = row_matrix(many.bodies.rotation, owner), row_vector(many.contacts.normal, k, 0)
