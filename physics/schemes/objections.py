@@ -27,28 +27,6 @@ DECLARED = {
 _OF_STAGES = (LAW_STIFFNESS,)
 
 
-def to_laws_at_walls(scene: Scene, needs: Needs, known: frozenset[str]) -> str:
-    """Message against contact laws that act at walls only, for a scheme with `known` others; "" if there are none."""
-    names = ", ".join(DECLARED[law] for law in needs.laws if law in DECLARED and law not in known)
-    if not names:
-        return ""
-    return f"Scene.effects holds {names}, known at walls only, and {_coupling(scene, needs)}"
-
-
-def _coupling(scene: Scene, needs: Needs) -> str:
-    """Reason why the bodies of a scene have one contact problem, and what would part them."""
-    for b, body in enumerate(scene.bodies):
-        if body.fixed:
-            return f"Scene.bodies[{b}] is fixed; allowed is a HalfSpace in its place"
-        if body.kind in ("hull", "capsule", "cylinder", "compound"):
-            return f"Scene.bodies[{b}] is a {body.kind}; allowed are blocks, spheres and ellipsoids"
-    if needs.meeting:
-        return "bodies may touch each other; allowed is Contact(between_bodies=False)"
-    if needs.grouped:
-        return "groups keep bodies from walls; allowed are masks with which all bodies touch all walls"
-    return "a Spring ties bodies to each other; allowed are anchors in the world"
-
-
 def to_laws_of_stages(needs: Needs) -> str:
     """Message against contact laws that act over a stage of time stepping only; "" if the scene has none."""
     unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
