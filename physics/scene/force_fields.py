@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
 from physics.annotations import Vector
-from physics.kernels.forces import angular_drag, buoyancy, drag, magnus, wind
+from physics.kernels.forces import angular_drag, buoyancy, buoyancy_of_shapes, drag, drag_of_shapes, magnus, wind
 from physics.keywords import known_keywords
-from physics.scene.force_field import Checked
+from physics.scene.force_field import Checked, OfShapes
 from physics.scene.springs import Push, Spring
 
 AIR_DENSITY = 1.225  # at sea level, 15 °C (ISO 2533, standard atmosphere) [kg/m³]
@@ -44,7 +44,9 @@ class Drag(Checked):
     function: ClassVar[Any] = drag.drag
     _rates: ClassVar[Any] = drag.drag_rates
     _soften: ClassVar[Any] = drag.soften_drag
-    needs_axes: ClassVar[bool] = True
+    _of_shapes: ClassVar[OfShapes | None] = OfShapes(
+        drag_of_shapes.drag_of_shapes, drag_of_shapes.rates_of_shapes, drag_of_shapes.soften_drag_of_shapes
+    )
 
     def __post_init__(self) -> None:
         for name in ("coefficient", "density", "linear"):
@@ -216,7 +218,12 @@ class Buoyancy(Checked):
     function: ClassVar[Any] = buoyancy.buoyancy
     _rates: ClassVar[Any] = buoyancy.buoyancy_rates
     _soften: ClassVar[Any] = buoyancy.soften_buoyancy
-    needs_axes: ClassVar[bool] = True
+    _of_shapes: ClassVar[OfShapes | None] = OfShapes(
+        buoyancy_of_shapes.buoyancy_of_shapes,
+        buoyancy_of_shapes.buoyancy_rates_of_shapes,
+        buoyancy_of_shapes.soften_buoyancy_of_shapes,
+        buoyancy_of_shapes.energy_of_shapes,
+    )
     energy: ClassVar[Any] = buoyancy.buoyancy_energy
 
     def __post_init__(self) -> None:

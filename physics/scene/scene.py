@@ -263,7 +263,7 @@ class Scene:
             if unknown:
                 raise ValueError(
                     f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a {body.kind}; allowed with "
-                    "it are blocks, spheres and ellipsoids: it depends on what their surface is like"
+                    "it are blocks, spheres and ellipsoids: its law is that of round bodies, in terms of half axes"
                 )
         if fields and all(each.is_air for each in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")
