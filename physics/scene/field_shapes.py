@@ -11,13 +11,13 @@ from physics.scene.bodies import Body
 from physics.scene.compound import Compound
 from physics.scene.parts import SHAPE_CODES
 
-WITHOUT_AXES = ("hull", "capsule", "cylinder", "compound")
-"""Kinds of bodies of which half extents do not tell the shape."""
+DESCRIBED = ("hull", "capsule", "cylinder", "compound")
+"""Kinds of bodies whose half extents do not tell their shape, and that the functions of shapes know."""
 
 
 def have_axes(bodies: Sequence[Body]) -> bool:
     """True if the half axes of every body that moves tell its shape."""
-    return all(body.fixed or body.kind not in WITHOUT_AXES for body in bodies)
+    return all(body.fixed or body.kind not in DESCRIBED for body in bodies)
 
 
 def shape_table(bodies: Sequence[Body]) -> np.ndarray:
@@ -36,7 +36,7 @@ def _row(body: Body) -> np.ndarray:
     volumes = np.array([part.volume for part, _, _ in records])
     offset = np.linalg.norm(volumes @ [place for _, place, _ in records] / volumes.sum())
     reach = float(body.bounding_radius(body.dimensions)) + float(np.linalg.norm(body.center))
-    row, triangles, end = [len(parts), reach, offset], [], at.FIRST_PART + at.PART_SIZE * len(records)
+    row, triangles, end = [len(parts), reach, volumes.sum(), offset], [], at.FIRST_PART + at.PART_SIZE * len(records)
     for part, place, R in records:
         faces = triangles_of(part)
         row += [SHAPE_CODES[part.kind], *place, *R.ravel(), *part.dimensions, end, len(faces)]

@@ -93,6 +93,11 @@ class Field(Effect):
         return super().__new__(cls)
 
     @property
+    def knows_shapes(self) -> bool:
+        """True if other functions of this built-in field serve bodies whose half axes do not tell their shape."""
+        return _has_functions_of_shapes(self.kind)
+
+    @property
     def kind(self) -> type[Field]:
         """Class whose functions are compiled for this field; by default the field's own class."""
         return type(self)
@@ -209,7 +214,7 @@ def field_slots(effects: Iterable[Any], body_count: int, shapes: np.ndarray | No
     slots, first = [], 0
     for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
         size = _column_count(kind, found, body_count)
-        if shapes is not None and kind._of_shapes is not None:
+        if shapes is not None and _has_functions_of_shapes(kind):
             slots.append(FieldSlot(kind, _term_of_shapes(kind, size, shapes), first, tuple(found), shapes=shapes))
             first += slots[-1].term.size
             continue
@@ -224,6 +229,11 @@ def field_slots(effects: Iterable[Any], body_count: int, shapes: np.ndarray | No
         slots.append(FieldSlot(kind, term, first, tuple(found), is_users, may_raise))
         first += size * len(found)
     return tuple(slots)
+
+
+def _has_functions_of_shapes(kind: type[Field]) -> bool:
+    """True for a built-in field with an `OfShapes`; a user's subclass with a function of its own has none."""
+    return kind._of_shapes is not None and _is_built_in(_compiled(kind, "function"))
 
 
 def _term_of_shapes(kind: type[Field], size: int, shapes: np.ndarray) -> Term:

@@ -24,7 +24,8 @@ WATER_DENSITY = 1000.0  # [kg/m³]
 class Drag(Checked):
     """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
 
-    u is the velocity of the body's geometric centre relative to the air (`Wind`). The force acts at that centre.
+    u is the velocity of the body's geometric centre relative to the air (`Wind`). The force acts at that centre. Each
+    part of a compound has a drag of its own; parts do not shelter each other.
 
     Parameters
     ----------
@@ -44,6 +45,7 @@ class Drag(Checked):
     function: ClassVar[Any] = drag.drag
     _rates: ClassVar[Any] = drag.drag_rates
     _soften: ClassVar[Any] = drag.soften_drag
+    needs_axes: ClassVar[bool] = True
     _of_shapes: ClassVar[OfShapes | None] = OfShapes(
         drag_of_shapes.drag_of_shapes, drag_of_shapes.rates_of_shapes, drag_of_shapes.soften_drag_of_shapes
     )
@@ -186,7 +188,7 @@ class Wind(Checked):
 class Buoyancy(Checked):
     """Lift of a fluid at rest that fills a half-space: the weight of the fluid displaced by a body.
 
-    The force acts at the centre of the submerged part of the body.
+    The force acts at the centre of the submerged part of the body. Where parts of a compound overlap, they count twice.
 
     Parameters
     ----------
@@ -218,6 +220,7 @@ class Buoyancy(Checked):
     function: ClassVar[Any] = buoyancy.buoyancy
     _rates: ClassVar[Any] = buoyancy.buoyancy_rates
     _soften: ClassVar[Any] = buoyancy.soften_buoyancy
+    needs_axes: ClassVar[bool] = True
     _of_shapes: ClassVar[OfShapes | None] = OfShapes(
         buoyancy_of_shapes.buoyancy_of_shapes,
         buoyancy_of_shapes.buoyancy_rates_of_shapes,

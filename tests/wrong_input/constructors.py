@@ -170,7 +170,7 @@ SCENES = rows(
     ("drag-of-a-cylinder", lambda: p.Scene(p.Cylinder(1, 1, 1), [], p.Drag()), ("Drag", "bodies[0] is a cylinder")),
     ("drag-of-a-capsule", lambda: p.Scene(p.Capsule(1, 1, 1), [], p.Drag()), ("Drag", "bodies[0] is a capsule")),
     ("drag-of-a-compound", lambda: p.Scene(p.Compound([ball()]), [], p.Drag()), ("Drag", "is a compound", "block")),
-    ("drag-of-a-hull", lambda: p.Scene(p.Hull(TETRAHEDRON, 1), [], p.Drag()), ("Drag", "bodies[0] is a hull", "block")),
+    ("lift-of-a-hull", lambda: p.Scene(p.Hull(TETRAHEDRON, 1), [], p.Magnus()), ("Magnus", "[0] is a hull", "block")),
     ("effect-by-name", lambda: scene().effect("Gravity"), ("kind is 'Gravity'", "the class of an effect")),
     ("scene-keyword", lambda: p.Scene([ball()], efects=[]), ("'efects' (given: [])", "allowed are effects,")),
 )

@@ -1,10 +1,10 @@
 """Shapes of bodies as fields read them in scenes with hulls, capsules, cylinders or compounds.
 
 Such fields have the shapes of a body behind their other parameters, from column `first` on: the number of parts of a
-compound, 0 for any other body; a bound of the distance of any point from the centre of mass; the distance of the
-centre of the volume from it. A record of each part follows (`PART_SIZE` columns), then triangles of the faces of hulls,
-nine numbers each, in body axes. A body that is no compound has one record, of which only the triangles are read: its
-shape and dimensions are those of its state, since its size may differ from world to world.
+compound, 0 for any other body; a bound of the distance of any point from the centre of mass; the volume, and the
+distance of its centre from the centre of mass. A record of each part follows (`PART_SIZE` columns), then triangles of
+the faces of hulls, nine numbers each, in body axes. A body that is no compound has one record, of which only the
+triangles are read: its shape and dimensions are those of its state, since its size may differ from world to world.
 
 `physics.scene.field_shapes` writes the columns.
 """
@@ -15,7 +15,7 @@ from physics.compiler.decorators import inlined
 from physics.kernels.math import quaternion as qt
 
 # Columns from `first` on.
-PART_COUNT, BOUND, VOLUME_OFFSET, FIRST_PART = 0, 1, 2, 3
+PART_COUNT, BOUND, VOLUME, VOLUME_OFFSET, FIRST_PART = 0, 1, 2, 3, 4
 
 # Columns of a part: code of its shape, its geometric centre from the body's centre of mass [m], matrix from its axes to
 # body axes, half axes or half extents [m], place of its first triangle behind `first`, number of its triangles.

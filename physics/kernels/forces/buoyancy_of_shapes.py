@@ -12,7 +12,9 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.body_shapes import (
     BOUND,
+    VOLUME,
     VOLUME_OFFSET,
+    is_whole,
     part_count,
     read_part,
     triangle,
@@ -148,8 +150,8 @@ def _largest_section(i, state, p):
 def _squares(state, p, J, h):
     """Squared frequencies with which a floating body heaves and rolls at most [1/s²], as those of `buoyancy`.
 
-    The ratio of second moments is again 5/4 at most for uniform bodies. The distance c of the centre of the volume
-    from that of mass adds ρ g V c J, with V <= 2 A R and the bound R of the body.
+    The ratio of second moments is again 5/4 at most for uniform bodies. The distance c of the centre of the volume V
+    from that of mass adds ρ g V c J. V is at most 2 A R, with the bound R of the body; that of a compound is known.
     """
     c = math.sqrt(qt.dot(state.center, state.center))
     bound = max(p[FLUID_SHAPES + BOUND], math.sqrt(qt.dot(state.dims, state.dims)) + c)
@@ -160,8 +162,9 @@ def _squares(state, p, J, h):
     for i in range(part_count(p, FLUID_SHAPES)):
         area += _largest_section(i, state, p)
     heave = p[FLUID_WEIGHT] * area / state.mass
-    offset = 2.0 * bound * max(p[FLUID_SHAPES + VOLUME_OFFSET], c) * state.mass * max(J[0], J[1], J[2])
-    return heave, heave * (1.25 + offset)
+    volume = 2.0 * area * bound if is_whole(p, FLUID_SHAPES) else p[FLUID_SHAPES + VOLUME]
+    moment = p[FLUID_WEIGHT] * volume * max(p[FLUID_SHAPES + VOLUME_OFFSET], c)
+    return heave, 1.25 * heave + moment * max(J[0], J[1], J[2])
 
 
 @kernel
