@@ -33,7 +33,7 @@ def to_laws_of_stages(needs: Needs) -> str:
     if unknown:
         return (
             f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
-            "every time-stepping scheme"
+            "every time-stepping scheme: events are those of contacts that stay closed, not of springs of any depth"
         )
     return ""
 
@@ -43,7 +43,7 @@ def to_sleeping(needs: Needs) -> str:
     if needs.sleeping:
         return (
             "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
-            "time-stepping scheme"
+            "time-stepping scheme: a threshold of motion is an error that its tolerance does not bound"
         )
     return ""
 
@@ -89,17 +89,7 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against a cylinder that may touch another body than a sphere, or has a torque of `RollingFriction`.
-
-    "" if there is neither.
-    """
-    for b, body in enumerate(scene.bodies if {LAW_ROLLING, LAW_SPIN} & set(needs.laws) else ()):
-        if not body.fixed and any(part.kind == "cylinder" for part in with_parts([body])):
-            return (
-                f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in needs.laws else LAW_SPIN]}, but "
-                f"Scene.bodies[{b}] is or holds a cylinder, whose faces do not roll; allowed are spheres, "
-                "ellipsoids and capsules beside bodies without round parts"
-            )
+    """Message against a cylinder that may touch another body than a sphere; "" if there is none."""
     if not (needs.meeting and needs.cylinders):
         return ""
     between = needs.contact.between_bodies

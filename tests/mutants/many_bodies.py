@@ -229,6 +229,14 @@ NARROWPHASE = [
 
 SOLVER = [
     _mutant(
+        "solver-face",
+        "The face of a cylinder rolls on a wall.",
+        "solver/resistance_torques.py",
+        "across = 0.0 if _is_on_face(k, many) else rolling_radius(body) * p",
+        "across = rolling_radius(body) * p",
+        "physics/test_rolling_cylinders.py::test_a_face_does_not_roll",
+    ),
+    _mutant(
         "solver-torque-reaction",
         "A body on which another one rolls or spins gets the same torque as that one, not the opposite one.",
         "solver/resistance_torques.py",
