@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 import physics
-from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
 G, R, H, M = 9.81, 0.2, 0.5, 2.0
 FLOOR = physics.HalfSpace((0, 1, 0))
 LYING = (math.sqrt(0.5), math.sqrt(0.5), 0, 0)  # body y along world z
-PRESETS = sweep(["balanced", "precise"], ["balanced"])
+PRESETS = ["balanced", pytest.param("precise", marks=[pytest.mark.exhaustive, pytest.mark.compiled])]
 
 
 def world(body, *laws, preset="balanced", gravity=(0, -G, 0), mu=0.5):
