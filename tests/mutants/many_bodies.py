@@ -232,8 +232,8 @@ SOLVER = [
         "solver-face",
         "The face of a cylinder rolls on a wall.",
         "solver/resistance_torques.py",
-        "across = 0.0 if _is_on_face(k, many) else rolling_radius(body) * p",
-        "across = rolling_radius(body) * p",
+        "        return 0.0, spin_radius(body) * p",
+        "        return rolling_radius(body) * p, spin_radius(body) * p",
         "physics/test_rolling_cylinders.py::test_a_face_does_not_roll",
     ),
     _mutant(

@@ -126,8 +126,9 @@ def _limited(T, n, across, along):
 def _limits(k, many):
     """Largest torques of contact k, across and along its normal [kg m²/s]."""
     body, p = many.bodies.body[many.contacts.bodies[k, 0]], many.resistance.push[k]
-    across = 0.0 if _is_on_face(k, many) else rolling_radius(body) * p
-    return across, spin_radius(body) * p
+    if _is_on_face(k, many):
+        return 0.0, spin_radius(body) * p
+    return rolling_radius(body) * p, spin_radius(body) * p
 
 
 @inlined

@@ -63,7 +63,8 @@ def _set_displacement_targets(n, many):
         slop, gap = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many), many.contacts.gap[k]
         goal = -max(gap, 0.0)
         if gap < -slop:
-            goal = correction_of(gap, -_CORRECTION_SHARE * (gap + 0.5 * slop), many)
+            goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)
+            goal = correction_of(gap, goal, many)
             largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
         put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
