@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
 from physics.annotations import Vector
-from physics.kernels.forces import angular_drag, buoyancy, buoyancy_of_shapes, drag, drag_of_shapes, magnus, wind
+from physics.kernels.forces import angular_drag, buoyancy, drag, magnus, wind
+from physics.kernels.forces import buoyancy_of_shapes as wet_shapes
+from physics.kernels.forces import drag_of_shapes as shadows
 from physics.keywords import known_keywords
 from physics.scene.force_field import Checked, OfShapes
 from physics.scene.springs import Push, Spring
@@ -47,7 +49,7 @@ class Drag(Checked):
     _soften: ClassVar[Any] = drag.soften_drag
     needs_axes: ClassVar[bool] = True
     _of_shapes: ClassVar[OfShapes | None] = OfShapes(
-        drag_of_shapes.drag_of_shapes, drag_of_shapes.rates_of_shapes, drag_of_shapes.soften_drag_of_shapes
+        shadows.drag_of_shapes, shadows.rates_of_shapes, shadows.soften_drag_of_shapes
     )
 
     def __post_init__(self) -> None:
@@ -222,10 +224,10 @@ class Buoyancy(Checked):
     _soften: ClassVar[Any] = buoyancy.soften_buoyancy
     needs_axes: ClassVar[bool] = True
     _of_shapes: ClassVar[OfShapes | None] = OfShapes(
-        buoyancy_of_shapes.buoyancy_of_shapes,
-        buoyancy_of_shapes.buoyancy_rates_of_shapes,
-        buoyancy_of_shapes.soften_buoyancy_of_shapes,
-        buoyancy_of_shapes.energy_of_shapes,
+        wet_shapes.buoyancy_of_shapes,
+        wet_shapes.buoyancy_rates_of_shapes,
+        wet_shapes.soften_buoyancy_of_shapes,
+        wet_shapes.energy_of_shapes,
     )
     energy: ClassVar[Any] = buoyancy.buoyancy_energy
 
