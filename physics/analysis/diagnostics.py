@@ -10,8 +10,10 @@ from physics import validation
 from physics.html_table import parts_table
 from physics.kernels.forces.queries import evaluate_fields
 from physics.kernels.half_space.gap_queries import contact_spring_energies
+from physics.kernels.multibody.stepping.spring_energies import contact_spring_energies_of_worlds
 from physics.kernels.state import layout as at
 from physics.kernels.state.contact_law_dispatch import LAW_STIFFNESS
+from physics.kernels.state.groups import BodyArrays
 from physics.kernels.time_stepping.workspace import body_records
 from physics.parallel.exclusive import exclusive
 from physics.scene.field_errors import raised
@@ -73,9 +75,7 @@ def _diagnose(world: World) -> Diagnostics:
     if world.plan.fields:
         potential += _look_at(world)[1].reshape(shape)
     if LAW_STIFFNESS in world.plan.laws:
-        energies, column = np.empty(len(world.state)), law_column(world.params, world.plan, LAW_STIFFNESS)
-        contact_spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
-        potential += energies.reshape(shape)
+        potential += _spring_energies(world).reshape(shape)
     return Diagnostics(
         kinetic_energy=0.5 * np.sum(momentum * world.linvel + angular * world.angvel, axis=-1),
         potential_energy=potential,
@@ -83,6 +83,19 @@ def _diagnose(world: World) -> Diagnostics:
         angular_momentum=angular.copy(),
         gap=np.where((which < 0).reshape(shape) | is_fixed, np.inf, gaps.reshape(shape)),
     )
+
+
+def _spring_energies(world: World) -> np.ndarray:
+    """Energies of the contact springs of every row [J], (worlds * bodies,)."""
+    plan, energies = world.plan, np.empty(len(world.state))
+    if not plan.scheme.couples_bodies:
+        column = law_column(world.params, plan, LAW_STIFFNESS)
+        contact_spring_energies(world.state, world.params, world.shapes, world.walls, column, energies)
+        return energies
+    arrays = BodyArrays(world.state, world.params, world.shapes, None, np.zeros((len(world.state), 6)))
+    end, shapes_met = world.params.shape[1] - plan.motion_columns, (plan.ellipsoids, plan.hulls)
+    contact_spring_energies_of_worlds(arrays, end, plan.offset_frame, shapes_met, energies, world.scratch[0])
+    return energies
 
 
 def look_at(world: World) -> tuple[np.ndarray, np.ndarray]:

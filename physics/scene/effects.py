@@ -66,9 +66,9 @@ class Contact(Effect):
         point of contact leaves an impact with -e_t times its tangential velocity, as far as the cone of `Friction`
         allows. 1: a superball; 0: the point sticks; -1: it slides on. None acts like 0, and compiles nothing for it.
     stiffness : float, optional
-        k of a spring between each contact point (a vertex, the lowest point of a round body) and a wall [N/m]; greater
-        than 0. The spring pushes with k times the depth; it makes a body bounce, and `restitution` must be None.
-        None: rigid contact.
+        k of a spring at each contact point (a vertex, the lowest point of a round body) of a body with a wall or with
+        another body [N/m]; greater than 0. The spring pushes with k times the depth; it makes a body bounce, and
+        `restitution` must be None. None: rigid contact.
     damping : float, optional
         c of a damper beside the spring [N s/m]; at least 0. Spring and damper together never pull (Kelvin and Voigt's
         model, without adhesion).

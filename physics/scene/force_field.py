@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,18 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 field_function = user_kernel
+
+
+class OfShapes(NamedTuple):
+    """Functions of a built-in field in scenes with bodies whose half axes do not tell their shape.
+
+    They read the shapes behind the numbers of `Field.columns` (`physics.kernels.forces.body_shapes`).
+    """
+
+    function: Any
+    rates: Any
+    soften: Any
+    energy: Any = None
 
 
 @dataclass(frozen=True)
@@ -59,8 +71,8 @@ class Field(Effect):
     is_linked : bool, of the class
         Whether `function` depends on another body, too. Only the built-in `Spring` between two bodies supports it.
     needs_axes : bool, of the class
-        Whether `function` reads the shape and the half axes in the state. A hull has no half axes, so that a scene
-        with hulls refuses such a field.
+        Whether `function` reads the shape and the half axes in the state. A hull, capsule, cylinder or compound has no
+        half axes, so that a scene with one refuses such a field.
     """
 
     function: ClassVar[Any] = None
@@ -72,12 +84,18 @@ class Field(Effect):
     _rates: ClassVar[Any] = None  # of the built-in ones: see `physics.kernels.forces.implicit_loads`
     _soften: ClassVar[Any] = None
     _mean: ClassVar[Any] = None
+    _of_shapes: ClassVar[OfShapes | None] = None
 
     _repr_html_ = fields_table
 
     def __new__(cls, *values: Any, **named: Any) -> Self:
         field_check.check_class(cls, Field)
         return super().__new__(cls)
+
+    @property
+    def knows_shapes(self) -> bool:
+        """True if other functions of this built-in field serve bodies whose half axes do not tell their shape."""
+        return _has_functions_of_shapes(self.kind)
 
     @property
     def kind(self) -> type[Field]:
@@ -164,6 +182,8 @@ class FieldSlot:
         Whether the kind is a user's own, not a built-in one.
     may_raise : bool
         Whether a step may raise an exception in the kind's function.
+    shapes : (bodies, n) float64, optional
+        Columns of the bodies' shapes behind those of each field; None: the fields read none.
     """
 
     kind: type[Field]
@@ -172,12 +192,14 @@ class FieldSlot:
     effects: tuple[Field, ...]
     is_users: bool = False
     may_raise: bool = False
+    shapes: np.ndarray | None = None
 
 
-def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...]:
+def field_slots(effects: Iterable[Any], body_count: int, shapes: np.ndarray | None = None) -> tuple[FieldSlot, ...]:
     """Group the fields among a scene's effects by kind, with one slot for each kind.
 
-    The order of the slots does not depend on the order in which the scene declares its fields.
+    The order of the slots does not depend on the order in which the scene declares its fields. `shapes` are those of
+    `physics.scene.field_shapes` if half axes do not tell the shapes of all bodies; else None.
 
     Raises
     ------
@@ -192,6 +214,10 @@ def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...
     slots, first = [], 0
     for kind, found in sorted(kinds.items(), key=lambda item: _name(item[0])):
         size = _column_count(kind, found, body_count)
+        if shapes is not None and _has_functions_of_shapes(kind):
+            slots.append(FieldSlot(kind, _term_of_shapes(kind, size, shapes), first, tuple(found), shapes=shapes))
+            first += slots[-1].term.size
+            continue
         marker = f"{AIR if kind.is_air else LOAD}_{_name(kind)}_{len(found)}x{size}"
         functions: list[Any] = [_compiled(kind, name) for name in ("function", "energy")]
         is_users = not _is_built_in(functions[0])
@@ -203,6 +229,19 @@ def field_slots(effects: Iterable[Any], body_count: int) -> tuple[FieldSlot, ...
         slots.append(FieldSlot(kind, term, first, tuple(found), is_users, may_raise))
         first += size * len(found)
     return tuple(slots)
+
+
+def _has_functions_of_shapes(kind: type[Field]) -> bool:
+    """True for a built-in field with an `OfShapes`; a user's subclass with a function of its own has none."""
+    return kind._of_shapes is not None and _is_built_in(_compiled(kind, "function"))
+
+
+def _term_of_shapes(kind: type[Field], size: int, shapes: np.ndarray) -> Term:
+    """Term of the one field of a kind that reads the shapes of bodies, behind its `size` columns."""
+    assert kind._of_shapes is not None
+    made, size = kind._of_shapes, size + shapes.shape[1]
+    name = plain_function(made.function).__name__.replace("_", "")
+    return Term(f"{LOAD}_{name}_1x{size}", made.function, made.energy, size, 1, False, made.rates, made.soften)
 
 
 def _column_count(kind: type[Field], found: list[Field], body_count: int) -> int:
@@ -267,6 +306,8 @@ def write_columns(slots: Sequence[FieldSlot], params: np.ndarray, body_count: in
             first = slot.first + k * size
             for body in range(body_count):
                 numbers = field_check.numbers_of(effect, body, worlds)
+                if slot.shapes is not None:
+                    numbers = np.concatenate((numbers, slot.shapes[body]))
                 if numbers.shape[-1] != size:
                     name = f"{type(effect).__name__}.columns"
                     raise ValueError(f"{name} gives {numbers.shape[-1]} numbers; allowed are {size}, as in the scene")

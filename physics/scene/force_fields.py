@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from physics import validation
 from physics.annotations import Vector
 from physics.kernels.forces import angular_drag, buoyancy, drag, magnus, wind
+from physics.kernels.forces import buoyancy_of_shapes as wet_shapes
+from physics.kernels.forces import drag_of_shapes as shadows
 from physics.keywords import known_keywords
-from physics.scene.force_field import Checked
+from physics.scene.force_field import Checked, OfShapes
 from physics.scene.springs import Push, Spring
 
 AIR_DENSITY = 1.225  # at sea level, 15 °C (ISO 2533, standard atmosphere) [kg/m³]
@@ -24,7 +26,8 @@ WATER_DENSITY = 1000.0  # [kg/m³]
 class Drag(Checked):
     """Drag of the air (or water) on every body: ``F = -(½ ρ C A |u| + c) u``, A the area of its shadow along u.
 
-    u is the velocity of the body's geometric centre relative to the air (`Wind`). The force acts at that centre.
+    u is the velocity of the body's geometric centre relative to the air (`Wind`). The force acts at that centre. Each
+    part of a compound has a drag of its own; parts do not shelter each other.
 
     Parameters
     ----------
@@ -45,6 +48,9 @@ class Drag(Checked):
     _rates: ClassVar[Any] = drag.drag_rates
     _soften: ClassVar[Any] = drag.soften_drag
     needs_axes: ClassVar[bool] = True
+    _of_shapes: ClassVar[OfShapes | None] = OfShapes(
+        shadows.drag_of_shapes, shadows.rates_of_shapes, shadows.soften_drag_of_shapes
+    )
 
     def __post_init__(self) -> None:
         for name in ("coefficient", "density", "linear"):
@@ -184,7 +190,7 @@ class Wind(Checked):
 class Buoyancy(Checked):
     """Lift of a fluid at rest that fills a half-space: the weight of the fluid displaced by a body.
 
-    The force acts at the centre of the submerged part of the body.
+    The force acts at the centre of the submerged part of the body. Where parts of a compound overlap, they count twice.
 
     Parameters
     ----------
@@ -217,6 +223,12 @@ class Buoyancy(Checked):
     _rates: ClassVar[Any] = buoyancy.buoyancy_rates
     _soften: ClassVar[Any] = buoyancy.soften_buoyancy
     needs_axes: ClassVar[bool] = True
+    _of_shapes: ClassVar[OfShapes | None] = OfShapes(
+        wet_shapes.buoyancy_of_shapes,
+        wet_shapes.buoyancy_rates_of_shapes,
+        wet_shapes.soften_buoyancy_of_shapes,
+        wet_shapes.energy_of_shapes,
+    )
     energy: ClassVar[Any] = buoyancy.buoyancy_energy
 
     def __post_init__(self) -> None:

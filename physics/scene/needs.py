@@ -20,6 +20,7 @@ from physics.kernels.state.contact_law_dispatch import (
 from physics.kernels.state.layout import VERTEX_COUNT
 from physics.mass.inertia import principal_axes
 from physics.scene.effects import Contact, Friction, Gravity, RollingFriction, Sleeping, SpinFriction
+from physics.scene.field_shapes import have_axes, shape_table
 from physics.scene.force_field import Field, FieldSlot, field_slots
 from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.materials import find_materials, has_restitution
@@ -158,7 +159,8 @@ def find_needs(scene: Scene) -> Needs:
     isotropic = all(is_isotropic(moments) for moments, _ in axes)
     motion_columns = max([0, *(body.motion.column_count for body in scene.bodies if body.motion is not None)])
     steady = all(effect.is_steady for effect in scene.effects if isinstance(effect, Field))
-    fields, materials = field_slots(scene.effects, len(scene.bodies)), find_materials(scene)
+    shapes = None if have_axes(scene.bodies) else shape_table(scene.bodies)
+    fields, materials = field_slots(scene.effects, len(scene.bodies), shapes), find_materials(scene)
     grained = touching and friction is not None and bool(friction.body_axes)
     return Needs(
         contact, friction, gravity, touching, meeting, fixed,

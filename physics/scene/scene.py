@@ -21,6 +21,7 @@ from physics.scene.capsule import Capsule
 from physics.scene.compound import Compound
 from physics.scene.cylinder import Cylinder
 from physics.scene.effects import EFFECTS, RESISTANCES, Contact, Friction, Sleeping
+from physics.scene.field_shapes import DESCRIBED
 from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups
 from physics.scene.materials import check_materials
@@ -259,11 +260,12 @@ class Scene:
             check_ends(each, self.bodies)
         for b, body in enumerate(self.bodies):
             is_without_axes = body.kind in ("hull", "capsule", "cylinder", "compound") and not body.fixed
-            unknown = [type(each).__name__ for each in fields if each.needs_axes and is_without_axes]
+            needy = [each for each in fields if each.needs_axes and not (each.knows_shapes and body.kind in DESCRIBED)]
+            unknown = [type(each).__name__ for each in needy if is_without_axes]
             if unknown:
                 raise ValueError(
                     f"Scene.effects holds {', '.join(unknown)}, and Scene.bodies[{b}] is a {body.kind}; allowed with "
-                    "it are blocks, spheres and ellipsoids: it depends on what their surface is like"
+                    "it are blocks, spheres and ellipsoids: its law is that of round bodies, in terms of half axes"
                 )
         if fields and all(each.is_air for each in fields):
             raise ValueError("Scene.effects holds Wind without what it acts through; add physics.Drag()")

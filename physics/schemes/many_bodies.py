@@ -16,7 +16,7 @@ from physics.kernels.multibody.stepping.adaptive_substep import (
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN, LAW_TANGENTIAL
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.body_axes import axis_table
 from physics.scene.effects import Contact, Friction
@@ -32,9 +32,6 @@ from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
 _OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
 """Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
-
-KNOWN_LAWS = _OF_STAGES | {LAW_TANGENTIAL, LAW_ANISOTROPY}
-"""Contact laws that this scheme supports."""
 
 
 def _meetings(scene: Scene, switches: Switches) -> int:
@@ -84,7 +81,6 @@ class ManyBodies(Scheme):
         found = objections.to_cylinders(scene, needs)
         if self.is_error_controlled:
             found = found or objections.to_laws_of_stages(needs)
-        found = found or objections.to_laws_at_walls(scene, needs, KNOWN_LAWS)
         found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 

@@ -13,6 +13,7 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_TANGENTIAL,
 )
 from physics.scene.body_axes import axis_table
+from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
 from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
@@ -26,35 +27,13 @@ DECLARED = {
 _OF_STAGES = (LAW_STIFFNESS,)
 
 
-def to_laws_at_walls(scene: Scene, needs: Needs, known: frozenset[str]) -> str:
-    """Message against contact laws that act at walls only, for a scheme with `known` others; "" if there are none."""
-    names = ", ".join(DECLARED[law] for law in needs.laws if law in DECLARED and law not in known)
-    if not names:
-        return ""
-    return f"Scene.effects holds {names}, known at walls only, and {_coupling(scene, needs)}"
-
-
-def _coupling(scene: Scene, needs: Needs) -> str:
-    """Reason why the bodies of a scene have one contact problem, and what would part them."""
-    for b, body in enumerate(scene.bodies):
-        if body.fixed:
-            return f"Scene.bodies[{b}] is fixed; allowed is a HalfSpace in its place"
-        if body.kind in ("hull", "capsule", "cylinder", "compound"):
-            return f"Scene.bodies[{b}] is a {body.kind}; allowed are blocks, spheres and ellipsoids"
-    if needs.meeting:
-        return "bodies may touch each other; allowed is Contact(between_bodies=False)"
-    if needs.grouped:
-        return "groups keep bodies from walls; allowed are masks with which all bodies touch all walls"
-    return "a Spring ties bodies to each other; allowed are anchors in the world"
-
-
 def to_laws_of_stages(needs: Needs) -> str:
     """Message against contact laws that act over a stage of time stepping only; "" if the scene has none."""
     unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
     if unknown:
         return (
             f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
-            "every time-stepping scheme"
+            "every time-stepping scheme: events are those of contacts that stay closed, not of springs of any depth"
         )
     return ""
 
@@ -64,7 +43,7 @@ def to_sleeping(needs: Needs) -> str:
     if needs.sleeping:
         return (
             "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
-            "time-stepping scheme"
+            "time-stepping scheme: a threshold of motion is an error that its tolerance does not bound"
         )
     return ""
 
@@ -110,12 +89,19 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
 
 
 def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against a torque of `RollingFriction` or `SpinFriction` on a cylinder that moves; "" if there is none."""
-    for b, body in enumerate(scene.bodies if {LAW_ROLLING, LAW_SPIN} & set(needs.laws) else ()):
-        if not body.fixed and any(part.kind == "cylinder" for part in with_parts([body])):
+    """Message against torques of rolling or spin friction on a cylinder that may touch another body than a sphere."""
+    laws = {LAW_ROLLING, LAW_SPIN} & set(needs.laws)
+    if not (laws and needs.meeting and needs.cylinders):
+        return ""
+    between = needs.contact.between_bodies
+    pairs = touching_pairs(scene, between)
+    pairs = potential_pairs(scene, between) if pairs is None else pairs
+    kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
+    for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
+        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
             return (
-                f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in needs.laws else LAW_SPIN]}, but "
-                f"Scene.bodies[{b}] is or holds a cylinder, whose faces do not roll; allowed are spheres, "
-                "ellipsoids and capsules beside bodies without round parts"
+                f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in laws else LAW_SPIN]}, but "
+                f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; cylinders have it at "
+                "walls and spheres: allowed are groups that keep both apart, and spheres, ellipsoids and capsules"
             )
     return ""

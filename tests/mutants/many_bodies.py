@@ -39,6 +39,14 @@ BROADPHASE = [
 
 DATA = [
     _mutant(
+        "data-give",
+        "The velocity of a compliant contact does not include that of its spring.",
+        "data/compliance.py",
+        "return value + many.compliance.give[k] * many.contacts.impulse[k, 0]",
+        "return value",
+        "physics/test_compliance_between.py::test_two_equal_balls_are_an_oscillator_of_half_the_mass",
+    ),
+    _mutant(
         "data-clipped",
         "A point where two edges cross is carried along with the incident face.",
         "data/clipped_points.py",
@@ -277,6 +285,14 @@ NARROWPHASE = [
 
 SOLVER = [
     _mutant(
+        "solver-face",
+        "The face of a cylinder rolls on a wall.",
+        "solver/resistance_torques.py",
+        "        return 0.0, spin_radius(body) * p",
+        "        return rolling_radius(body) * p, spin_radius(body) * p",
+        "physics/test_rolling_cylinders.py::test_a_face_does_not_roll",
+    ),
+    _mutant(
         "solver-torque-reaction",
         "A body on which another one rolls or spins gets the same torque as that one, not the opposite one.",
         "solver/resistance_torques.py",
@@ -329,6 +345,14 @@ SOLVER = [
 _CASE = "hard_cases/test_cases.py::test_the_case_comes_out_as_it_must"
 
 STEPPING = [
+    _mutant(
+        "stepping-paid",
+        "A depth that no force has caused pushes.",
+        "stepping/compliant_stage.py",
+        "soft.unpaid[k] = 0.0 if is_placed else (share - 1.0) * min(many.contacts.gap[k], 0.0)",
+        "soft.unpaid[k] = 0.0",
+        "physics/test_compliance_between.py::test_springs_that_appear_do_not_push",
+    ),
     _mutant(
         "stepping-tangential-aim",
         "An impact aims at the tangential velocity before it in one direction of the plane, not against it.",

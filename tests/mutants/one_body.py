@@ -135,6 +135,22 @@ FLIGHT = [
 
 FORCES = [
     _mutant(
+        "forces-faces",
+        "The shadow of a hull is that of all its faces, instead of half of it.",
+        "forces/drag_of_shapes.py",
+        "return 0.25 * total",
+        "return 0.5 * total",
+        "physics/test_fields_of_shapes.py::test_drag_is_that_of_the_shadow",
+    ),
+    _mutant(
+        "forces-segment",
+        "The moment of a wet segment of a disk is half of what it is.",
+        "forces/wet_revolution.py",
+        "rho * rho * rho * 2.0 / 3.0",
+        "rho * rho * rho * 1.0 / 3.0",
+        "physics/test_fields_of_shapes.py::test_buoyancy_is_the_slope_of_its_energy",
+    ),
+    _mutant(
         "forces-shadow",
         "Drag takes the first half edge twice for the area of a face.",
         "forces/drag.py",

@@ -445,8 +445,8 @@ def test_a_trajectory_file_keeps_capsules(tmp_path):
 
 def test_effects_that_capsules_cannot_have_are_refused_by_name():
     capsule = physics.Capsule(0.1, 0.6, 1.0)
-    with pytest.raises(ValueError, match=r"holds Drag, and Scene.bodies\[0\] is a capsule"):
-        physics.Scene(capsule, effects=physics.Drag())
+    with pytest.raises(ValueError, match=r"holds Magnus, and Scene.bodies\[0\] is a capsule"):
+        physics.Scene(capsule, effects=physics.Magnus())
 
 
 def test_a_plan_says_what_capsules_need():

@@ -303,10 +303,6 @@ def at_precise():
     return world(ball(), accuracy="precise")
 
 
-def two_balls():
-    return physics.Scene([ball(), ball(pos=(3, 1, 0))], [FLOOR], [physics.Contact(stiffness=1.0)])
-
-
 BAD = [
     (lambda: physics.Contact(stiffness=0), r"Contact.stiffness is 0.0; allowed are numbers greater than 0"),
     (lambda: physics.Contact(stiffness=1, damping=-1), r"Contact.damping is -1.0; allowed are numbers of at least 0"),
@@ -314,10 +310,6 @@ BAD = [
     (lambda: physics.Contact(0.5, stiffness=1), "Contact.restitution is 0.5 with a stiffness; allowed is None"),
     (lambda: physics.Contact(tangential=0, stiffness=1), "Contact.tangential is 0.0 with a stiffness; allowed is None"),
     (at_precise, "scheme 'events', which does not know Contact.stiffness; allowed are 'fast'"),
-    (
-        lambda: physics.World(two_balls()),
-        "Contact.stiffness, known at walls only, and bodies may touch each other",
-    ),
 ]
 
 

@@ -460,7 +460,10 @@ REFUSED = {
     "friction": (lambda: physics.Compound([physics.Sphere(1.0, 1.0, friction=0.3)]), r"parts\[0\]\.friction"),
     "a fixed part": (lambda: physics.Compound([physics.Sphere(1.0, fixed=True)]), r"parts\[0\]\.fixed is True"),
     "density": (lambda: physics.Compound(dumbbell().parts, density=2.0), "density is 2.0 of a Compound"),
-    "drag": (lambda: physics.Scene([dumbbell()], effects=[physics.Drag()]), r"Drag, and Scene.bodies\[0\] is a compo"),
+    "lift": (
+        lambda: physics.Scene([dumbbell()], effects=[physics.Magnus()]),
+        r"Magnus, and Scene.bodies\[0\] is a compo",
+    ),
     "size": (
         lambda: world_of(dumbbell(pos=(0, 1, 0))).set_parameters(size=(1, 1, 1)),
         r"Scene.bodies\[0\], a compound, which has its parts in all worlds",

@@ -331,9 +331,8 @@ def test_a_lone_hull_has_the_step_of_many_bodies_and_says_so():
 @pytest.mark.filterwarnings("ignore::physics.SceneWarning")
 def test_what_is_not_known_of_hulls_is_refused():
     hull, laws = physics.Hull(WEDGE, 1.0, pos=(0, 2, 0)), [physics.Gravity(), physics.Contact(), physics.Friction(0.5)]
-    for field in (physics.Drag(), physics.Magnus(), physics.Buoyancy()):
-        with pytest.raises(ValueError, match=rf"{type(field).__name__}, and Scene.bodies\[1\] is a hull; allowed with"):
-            physics.Scene([physics.Sphere(1.0, 1.0), hull], [FLOOR], [*laws, field])
+    with pytest.raises(ValueError, match=r"Magnus, and Scene.bodies\[1\] is a hull; allowed with"):
+        physics.Scene([physics.Sphere(1.0, 1.0), hull], [FLOOR], [*laws, physics.Magnus()])
     with pytest.raises(ValueError, match=r"tangential is 0.5, but Scene.bodies\[0\] is a hull; allowed"):
         physics.World(physics.Scene([hull], [FLOOR], [physics.Contact(tangential=0.5), physics.Friction(0.5)]))
     physics.World(physics.Scene([hull], [FLOOR], [*laws, physics.AngularDrag(0.1)]))  # needs no shape

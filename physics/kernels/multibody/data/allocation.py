@@ -34,6 +34,7 @@ from physics.kernels.multibody.data.arrays import (
     Bodies,
     BodiesWorkspace,
     BroadPhase,
+    Compliance,
     ContactSet,
     DrivenBodies,
     Islands,
@@ -49,7 +50,7 @@ from physics.kernels.multibody.data.arrays import (
 )
 from physics.kernels.multibody.data.hull_tables import clipped_face_capacity, make_hulls
 from physics.kernels.multibody.data.parts import ActingBodies, Part, make_parts, write_part_records
-from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN
+from physics.kernels.state.contact_law_dispatch import LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS
 from physics.kernels.state.layout import REPORT_SIZE, STATE_SIZE, VERTEX_COUNT
 from physics.kernels.time_stepping.workspace import body_fields, setting_fields
 
@@ -121,8 +122,8 @@ def warm_start_size(
 
 
 def warm_contact_size(laws: tuple[str, ...] = ()) -> int:
-    """Number of columns of `memory` for each contact, its torque included, in a scene with these laws."""
-    return WARM_CONTACT_SIZE + TORQUE_SIZE * has_torques(laws)
+    """Number of columns of `memory` for each contact, in a scene with these laws: its torque and its depth included."""
+    return WARM_CONTACT_SIZE + TORQUE_SIZE * has_torques(laws) + (LAW_STIFFNESS in laws)
 
 
 def has_torques(laws: tuple[str, ...]) -> bool:
@@ -201,6 +202,7 @@ def make_bodies_workspace(
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
         grain=settings.pop("grain", None),
+        compliance=_make_compliance(bodies, contacts) if LAW_STIFFNESS in laws else None,
         counts=np.zeros(5, np.int64),
         settings=_make_settings({"meet": 1, **settings}),
     )
@@ -387,6 +389,12 @@ def _make_resistance(bodies: int, contacts: int) -> Resistance:
         share=np.zeros(TORQUE_HISTORY),
         order=np.zeros(TORQUE_HISTORY, i),
     )
+
+
+def _make_compliance(bodies: int, contacts: int) -> Compliance:
+    rows = [np.zeros(contacts) for _ in range(5)]
+    sums = [np.zeros(bodies) for _ in range(3)]
+    return Compliance(*rows, np.zeros((contacts, 2)), *sums, last_drift=np.zeros(1))
 
 
 def _make_settings(settings: dict[str, float]) -> np.ndarray:

@@ -294,6 +294,21 @@ class Grain(NamedTuple):
     body_axis: np.ndarray  # (bodies, 3) unit vectors, or 0 for bodies without an axis, body frames
 
 
+class Compliance(NamedTuple):
+    """Numbers of compliant contacts in a stage, see `stepping.compliant_stage`."""
+
+    give: np.ndarray  # (contacts,) compliance γ on the diagonal of W, in the normal row; 0 outside a solve [1/kg]
+    unpaid: np.ndarray  # (contacts,) depth at the start of the stage that no force has caused; it does not push [m]
+    start_gap: np.ndarray  # (contacts,) gap at the start of the stage, unpaid depth left out, as below [m]
+    coast_gap: np.ndarray  # (contacts,) gap at its end, without the velocities after the impulses [m]
+    end_gap: np.ndarray  # (contacts,) gap at its end, as the contact problem foretells it [m]
+    plain: np.ndarray  # (contacts, 2) normal target [m/s] and `coast_gap` [m] of bodies that do not turn
+    mobility: np.ndarray  # (bodies,) sum of W_nn over the contacts of each body [1/kg]
+    paid: np.ndarray  # (bodies,) sum of the squares of the depths of each body's contacts that forces have caused [m²]
+    found: np.ndarray  # (bodies,) the same of the depths at the start of the stage [m²]
+    last_drift: np.ndarray  # (1,) length of the last drift of the stage [s]
+
+
 class BodiesWorkspace(NamedTuple):
     """Scratch memory of one thread for the world that it advances: bodies, pairs, contacts and solver."""
 
@@ -311,5 +326,6 @@ class BodiesWorkspace(NamedTuple):
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
     resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
     grain: Grain | None  # None: the scene has no friction with two coefficients
+    compliance: Compliance | None  # None: contact is rigid
     counts: np.ndarray  # (5,) int, counters: columns `NUM_CONTACTS` to `NUM_STOPPING` above
     settings: np.ndarray  # (1,) record with the fields of `allocation.bodies_setting_fields`

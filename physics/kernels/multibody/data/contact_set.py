@@ -13,6 +13,7 @@ from physics.kernels.multibody.data.arrays import FEATURES_PER_PAIR, NUM_CONTACT
 from physics.kernels.multibody.data.capsule_axes import normal_between_axes
 from physics.kernels.multibody.data.capsules import is_capsule
 from physics.kernels.multibody.data.clipped_points import clear_follow
+from physics.kernels.multibody.data.compliance import is_pressed_in
 from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
@@ -348,7 +349,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     many.bodies.touched[a] = 1
     if end >= 0:
         many.bodies.touched[b] = 1
-    if b >= 0 and is_stopping(gap, speed, slop, h):
+    if b >= 0 and is_stopping(gap, speed, slop, h) and not is_pressed_in(gap, many):
         many.counts[NUM_STOPPING] += 1
     many.counts[NUM_CONTACTS] = k + 1
     return True

@@ -27,6 +27,7 @@ from physics.kernels.multibody.data.driven_bodies import copy_driven_velocity
 from physics.kernels.multibody.data.fixed_bodies import shown_end
 from physics.kernels.multibody.data.grain import less_stretch
 from physics.kernels.multibody.data.parts import copy_parts
+from physics.kernels.multibody.data.warm_depths import move_warm_depth, store_warm_depth
 from physics.kernels.multibody.data.warm_torques import load_warm_torque, move_warm_torque, store_warm_torque
 from physics.kernels.state.sleeping import is_asleep
 
@@ -122,6 +123,7 @@ def _keep_sleeping(world, h, sleep, memory, many):
             for c in range(3):
                 memory[world, to + WARM_IMPULSE + c] *= h / length
             move_warm_torque(k, count, h / length, world, memory, many)
+            move_warm_depth(k, count, world, memory, many)
             count += 1
     return count
 
@@ -145,6 +147,7 @@ def store_warm_impulses(n, world, h, sleep, memory, many):
         p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
         put_vector(memory, world, row + WARM_IMPULSE, p)
         store_warm_torque(k, before + k, world, memory, many)
+        store_warm_depth(k, before + k, world, memory, many)
         put_vector(
             memory,
             world,

@@ -23,6 +23,7 @@ from physics.kernels.math.segments import nearest_place, point_on_segment
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_STOPPING
 from physics.kernels.multibody.data.capsules import half_axis, is_capsule
+from physics.kernels.multibody.data.compliance import is_pressed_in
 from physics.kernels.multibody.data.contact_set import is_stopping, pair_slop, row_matrix
 from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.hull_tables import FIRST_CORNER, FIRST_FACE, LAST_FACE
@@ -207,7 +208,8 @@ def leave_out_covered(first, h, many):
     for k in range(first, many.counts[NUM_CONTACTS]):
         if _is_carried(k, 0, first, many) or _is_carried(k, 1, first, many):
             slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
-            if is_stopping(many.contacts.gap[k], many.contacts.speed[k], slop, h):
+            gap = many.contacts.gap[k]
+            if is_stopping(gap, many.contacts.speed[k], slop, h) and not is_pressed_in(gap, many):
                 many.counts[NUM_STOPPING] -= 1
             continue
         if left < k:

@@ -11,7 +11,7 @@ When an island is prepared, the data of its contacts are copied into the batches
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.compiler.simd import (
     LANE_COUNT,
     Lanes,
@@ -59,6 +59,10 @@ IPM_UNIT, IPM_IMPULSE, IPM_VELOCITY = 22, 24, 27
 PROX_IMPULSE, PROX_BEST, PROX_ARGUMENT, PROX_PROJECTED = 30, 33, 36, 39
 
 
+# Compliance γ of a compliant contact. It has memory of `interior_point`, which takes rigid contacts only.
+LANE_GIVE = IPM_UNIT
+
+
 @inlined
 def batch_field(g, field, many):
     """Read a field of batch g: four numbers, one for each contact."""
@@ -96,6 +100,11 @@ def batch_frames(g, many):
     return (n[0], n[1], n[2], s[0], s[1], s[2], t[0], t[1], t[2])
 
 
+@if_given("many.compliance")
+def _fill_give(g, lane, k, many):
+    many.newton.lanes[g, LANE_COUNT * LANE_GIVE + lane] = many.compliance.give[k]
+
+
 @inlined
 def _fill_batch(g, i, n, many):
     """Copy the data of the n contacts from position i of `many.islands.contacts` on into batch g."""
@@ -112,6 +121,7 @@ def _fill_batch(g, i, n, many):
             many.contacts.mu[k],
             many.contacts.block[k, 0],
         )
+        _fill_give(g, lane, k, many)
         L[g, LANE_COUNT * LANE_STEP + lane], L[g, LANE_COUNT * LANE_WEIGHT + lane] = (
             many.contacts.step[k],
             1.0 if lane < n else 0.0,

@@ -5,7 +5,8 @@ u of contact k follows from the twists of its bodies a and b, without a Delassus
 
     u_k = E_k ((v + ω x r)_a - (v + ω x r)_b) - target_k.
 
-E_k is the contact frame and r are the arms. An impulse p of a contact changes the twists by M⁻¹ Jᵀ p.
+E_k is the contact frame and r are the arms. At compliant contacts γ p_n is added to the normal part
+(`stepping.compliant_stage`). An impulse p of a contact changes the twists by M⁻¹ Jᵀ p.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.compliance import plus_give, plus_give_velocity
 from physics.kernels.multibody.data.contact_set import add_scaled, contact_velocity, put_vector, row_matrix
 from physics.kernels.multibody.data.grain import stretched_inv_mass
 
@@ -96,7 +98,7 @@ def assemble_contact_blocks(n, many):
         if many.contacts.bodies[k, 1] >= 0:
             W = _add_mobility(k, many.contacts.bodies[k, 1], 3, W, many)
         B = many.contacts.block
-        B[k, 0], B[k, 1], B[k, 2] = W[0], W[1], W[2]
+        B[k, 0], B[k, 1], B[k, 2] = plus_give(k, W[0], many), W[1], W[2]
         B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
         B[k, 6], B[k, 7], B[k, 8] = W[2], W[4], W[5]
         half = 0.5 * (W[3] - W[5])
@@ -111,7 +113,7 @@ def assemble_contact_blocks(n, many):
 def velocity_error(k, many):
     """Velocity of contact k minus its target, in the contact frame: (normal, two tangents) [m/s]."""
     u, t = contact_velocity(k, many), row_vector(many.contacts.target, k, 0)
-    return (u[0] - t[0], u[1] - t[1], u[2] - t[2])
+    return (plus_give_velocity(k, u[0] - t[0], many), u[1] - t[1], u[2] - t[2])
 
 
 @inlined

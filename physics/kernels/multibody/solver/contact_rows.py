@@ -11,7 +11,7 @@ With f = Eᵀ p the impulse changes v_a by f/m_a and ω_a by I_a⁻¹ (r x f). I
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, row_matrix, subtract
@@ -19,7 +19,7 @@ from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 
 # Columns of `many.sweeps.visit_rows`: frame (from column 0 on), arms of both bodies, Delassus block and its inverse
-# (00, 01, 02, 11, 12, 22), target, μ, λ_max of the block's tangential part, impulse.
+# (00, 01, 02, 11, 12, 22), target, μ, λ_max of the block's tangential part, impulse; compliance γ of soft contacts.
 VISIT_ARM_A, VISIT_ARM_B, VISIT_BLOCK, VISIT_INVERSE, VISIT_TARGET, VISIT_MU, VISIT_LAMBDA_MAX, VISIT_IMPULSE = (
     9,
     12,
@@ -30,9 +30,26 @@ VISIT_ARM_A, VISIT_ARM_B, VISIT_BLOCK, VISIT_INVERSE, VISIT_TARGET, VISIT_MU, VI
     31,
     32,
 )
+VISIT_GIVE = 35
 
 # First number of an inverse that is not computed yet; that of any computed inverse is positive.
 NOT_INVERTED = 0.0
+
+
+@if_given("many.compliance")
+def _write_give(i, k, many):
+    many.sweeps.visit_rows[i, VISIT_GIVE] = many.compliance.give[k]
+
+
+def _error(i, u, many):
+    return u
+
+
+@if_given("many.compliance", _error)
+def _plus_give_velocity(i, u, many):
+    """Velocity error u of visit i, with γ p_n added to its normal part."""
+    R = many.sweeps.visit_rows
+    return (u[0] + R[i, VISIT_GIVE] * R[i, VISIT_IMPULSE], u[1], u[2])
 
 
 @inlined
@@ -49,6 +66,7 @@ def _write_visit(i, k, many):
     put_vector(R, i, VISIT_TARGET, row_vector(many.contacts.target, k, 0))
     R[i, VISIT_MU], R[i, VISIT_LAMBDA_MAX] = many.contacts.mu[k], 1.0 / many.contacts.step[k]
     put_vector(R, i, VISIT_IMPULSE, row_vector(many.contacts.impulse, k, 0))
+    _write_give(i, k, many)
     many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1] = (
         many.contacts.bodies[k, 0],
         many.contacts.bodies[k, 1],
@@ -109,9 +127,10 @@ def visit_velocity_error(i, many):
                 qt.cross(row_vector(t, b, ANGULAR_OFFSET), row_vector(many.sweeps.visit_rows, i, VISIT_ARM_B)),
             ),
         )
-    return subtract(
+    u = subtract(
         qt.matvec(row_matrix(many.sweeps.visit_rows, i), v), row_vector(many.sweeps.visit_rows, i, VISIT_TARGET)
     )
+    return _plus_give_velocity(i, u, many)
 
 
 @inlined

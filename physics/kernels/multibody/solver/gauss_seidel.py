@@ -16,6 +16,7 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_solver.one_contact import CONTACT_UNSOLVED, friction_direction, solve_contact_block
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.compliance import plus_give_velocity
 from physics.kernels.multibody.data.contact_set import put_vector, subtract
 from physics.kernels.multibody.solver.contact_operator import (
     max_contact_residual,
@@ -98,7 +99,7 @@ def relax_normal_impulse(k, visit, small, many):
     """
     many.sweeps.visited[k] = visit
     p, normal = many.contacts.impulse[k, 0], many.contacts.block[k, 0]
-    d = max(0.0, p - (normal_velocity(k, many) - many.contacts.target[k, 0]) / normal) - p
+    d = max(0.0, p - plus_give_velocity(k, normal_velocity(k, many) - many.contacts.target[k, 0], many) / normal) - p
     off = abs(d) * normal
     if off > small:
         many.contacts.impulse[k, 0] = p + d

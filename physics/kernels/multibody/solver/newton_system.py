@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.compiler.simd import Lanes, lane_sums, larger, load_lanes, select_lanes, store_lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
@@ -42,6 +42,27 @@ def subtract_twists(b, a, c, many):
     )
 
 
+def _unyielding(g, y, rho, many):
+    return y
+
+
+@if_given("many.compliance", _unyielding)
+def _yield_along_normals(g, y, rho, many):
+    """Divide the normal part of y = q - ρ u by 1 + ρ γ, which solves p = q - ρ (u + γ p) for compliant contacts."""
+    return (y[0] / (1.0 + rho * of.batch_field(g, of.LANE_GIVE, many)), y[1], y[2])
+
+
+def _same_slope(g, D, rho, many):
+    return D
+
+
+@if_given("many.compliance", _same_slope)
+def _slope_of_yielding(g, D, rho, many):
+    """Multiply the first column of D, the derivative of a projection, by the factor of `_yield_along_normals`."""
+    s = 1.0 / (1.0 + rho * of.batch_field(g, of.LANE_GIVE, many))
+    return (s * D[0], D[1], D[2], s * D[3], D[4], D[5], s * D[6], D[7], D[8])
+
+
 @kernel
 def compute_defect(part, rho, all_hold, many):
     """Compute the defect x - M⁻¹ Jᵀ p(x) of an island: (its norm weighted by mass, its largest velocity [m/s]).
@@ -56,7 +77,7 @@ def compute_defect(part, rho, all_hold, many):
         subtract_twists(many.islands.bodies[i], many.bodies.twist, many.bodies.free_twist, many)
     for g in range(many.counts[NUM_BATCHES]):
         u, q = of.batch_velocity_error(g, many), of.batch_vector(g, of.PROX_IMPULSE, many)
-        y = (q[0] - rho * u[0], q[1] - rho * u[1], q[2] - rho * u[2])
+        y = _yield_along_normals(g, (q[0] - rho * u[0], q[1] - rho * u[1], q[2] - rho * u[2]), rho, many)
         of.put_batch_vector(g, of.PROX_ARGUMENT, y, many)
         p = y
         if not all_hold:
@@ -228,5 +249,6 @@ def assemble_newton_matrix(part, rho, all_hold, many):
         y = of.batch_vector(g, of.PROX_ARGUMENT, many)
         if all_hold:
             y = (Lanes(1.0, 1.0, 1.0, 1.0), Lanes(0.0, 0.0, 0.0, 0.0), Lanes(0.0, 0.0, 0.0, 0.0))
-        add_batch_to_matrix(g, _projection_jacobian(y, of.batch_field(g, of.LANE_MU, many)), rho, many)
+        D = _slope_of_yielding(g, _projection_jacobian(y, of.batch_field(g, of.LANE_MU, many)), rho, many)
+        add_batch_to_matrix(g, D, rho, many)
     complete_matrix(begin, end, many)

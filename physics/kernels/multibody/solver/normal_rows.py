@@ -17,6 +17,7 @@ from physics.compiler.decorators import inlined
 from physics.compiler.simd import Lanes, lane_sum, load_lanes, store_lanes
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.compliance import plus_give
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import ANGULAR_OFFSET
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
@@ -84,7 +85,7 @@ def assemble_normal_row(k, many):
     W = _normal_mobility(k, many.contacts.bodies[k, 0], 0, ROW_MOMENT_A, many)
     if many.contacts.bodies[k, 1] >= 0:
         W += _normal_mobility(k, many.contacts.bodies[k, 1], 3, ROW_MOMENT_B, many)
-    many.contacts.block[k, 0] = W
+    many.contacts.block[k, 0] = plus_give(k, W, many)
 
 
 @inlined

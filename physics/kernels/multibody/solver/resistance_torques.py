@@ -34,9 +34,11 @@ from physics.kernels.math.full_pivot_solve import solve_full_pivot
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import TORQUE_HISTORY
 from physics.kernels.multibody.data.contact_set import PARTED, put_vector
+from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.driven_bodies import moving_body_at
 from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.parts import first_part, second_part
+from physics.kernels.multibody.data.rolling_points import may_roll
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 from physics.kernels.multibody.solver.solve import solve_contacts
 from physics.kernels.state import layout as at
@@ -60,13 +62,24 @@ def _is_round(part, many):
     return shape == at.SPHERE or shape == at.ELLIPSOID or shape == at.CAPSULE
 
 
+@if_given("many.bodies.cylinders", False)
+def _is_on_face(k, many):
+    """True if contact k is one of a cylinder's face on a wall: the face spins there, but does not roll."""
+    is_at_wall = body_at(many.contacts.bodies[k, 1], many) < 0
+    return is_at_wall and is_cylinder(first_part(k, many), many) and not may_roll(k, many)
+
+
 @inlined
 def _resists(k, many):
-    """True if a body at contact k is round there, and the contact is not between bodies that pass each other."""
+    """True if a body at contact k is round there, and the contact is not between bodies that pass each other.
+
+    A cylinder is round on a wall, on its rims and its side, and may spin there on a face.
+    """
     if many.contacts.owner[k] == PARTED:
         return False
     b = body_at(many.contacts.bodies[k, 1], many)
-    return _is_round(first_part(k, many), many) or (b >= 0 and _is_round(second_part(b, k, many), many))
+    is_round = _is_round(first_part(k, many), many) or (b >= 0 and _is_round(second_part(b, k, many), many))
+    return is_round or may_roll(k, many) or _is_on_face(k, many)
 
 
 @inlined
@@ -114,6 +127,8 @@ def _limited(T, n, across, along):
 def _limits(k, many):
     """Largest torques of contact k, across and along its normal [kg m²/s]."""
     body, p = many.bodies.body[many.contacts.bodies[k, 0]], many.resistance.push[k]
+    if _is_on_face(k, many):
+        return 0.0, spin_radius(body) * p
     return rolling_radius(body) * p, spin_radius(body) * p
 
 

@@ -9,7 +9,7 @@ If the warm start solves the problem, only its residual is computed. Else the co
    3, if all contacts push by then.
 3. A few sweeps, which solve impacts and separations.
 4. An interior-point method, which finds sticking, sliding and opening contacts from any start, and Newton's method on
-   the twists from its result, in turns.
+   the twists from its result, in turns. Compliant contacts are left to Newton's method.
 5. Sweeps up to their limit, from the best impulses so far.
 
 An impact with a coarse tolerance begins with sweeps up to their limit, since few of its contacts change.
@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel, shared_kernel
+from physics.compiler.decorators import if_given, inlined, kernel, shared_kernel
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import TWIST_DOFS
@@ -142,6 +142,16 @@ def clear_all_impulses(n, many):
         reset_body_to_free(b, many)
 
 
+def _approach_inside_cones(part, start, goal, limit, many):
+    return interior_point_contacts(part, start, goal, limit, many)
+
+
+@if_given("many.compliance", _approach_inside_cones)
+def _approach(part, start, goal, limit, many):
+    """Take no interior-point iterations: that method knows rigid contacts only. Otherwise it is done here."""
+    return 0
+
+
 @kernel
 def alternate_second_order(part, friction, scale, residual, goal, limit, many):
     """Improve the impulses of an island by interior-point and Newton's method in turns: (iterations, residual [m/s]).
@@ -156,7 +166,7 @@ def alternate_second_order(part, friction, scale, residual, goal, limit, many):
         if turn == last:
             start = scale
             clear_island_impulses(part, many)
-        count += interior_point_contacts(
+        count += _approach(
             part, start, max(goal, _INTERIOR_TOLERANCE * scale), min(_INTERIOR_STEPS[turn], limit - count), many
         )
         now = max_contact_residual(part[0], part[1], friction, many)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
 from physics.kernels.half_space import support_function as geo
 from physics.kernels.math import quaternion as qt
@@ -23,6 +23,7 @@ from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, r
 from physics.kernels.multibody.data.cylinders import cylinder_support, is_cylinder
 from physics.kernels.multibody.data.driven_bodies import driven_velocity, driven_work
 from physics.kernels.multibody.data.parts import is_compound, place_parts
+from physics.kernels.multibody.stepping.compliant_stage import dissipative_target, energy_with_springs
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.layout import HULL, WALL_NORMAL, WALL_OFFSET
@@ -52,7 +53,7 @@ def save_loaded_momenta(b, many):
 
 
 @kernel
-def has_gained_energy(n, h, many):
+def _has_gained_by_impulses(n, h, many):
     """True if the impulses of the n contacts in a resting stage of length h [s] have created energy.
 
     Errors of the solve and of the step are allowed for. Impulse P and angular impulse Q on a body change its energy by
@@ -94,6 +95,20 @@ def has_gained_energy(n, h, many):
     return gain > max(tolerance, ENERGY_GAIN_TOLERANCE) * size + tolerance * math.sqrt(fastest) * held
 
 
+def _has_gained_without_springs(n, h, many):
+    return _has_gained_by_impulses(n, h, many)
+
+
+@if_given("many.compliance", _has_gained_without_springs)
+def has_gained_energy(n, h, many):
+    """True if the springs of the n contacts and the motion have gained energy, in a stage of length h [s].
+
+    Rigid contacts are served by `_has_gained_by_impulses`, compliant ones by `compliant_stage`.
+    """
+    gain, size = energy_with_springs(n, h, many)
+    return gain > max(many.settings[0].tolerance, ENERGY_GAIN_TOLERANCE) * size
+
+
 @inlined
 def update_twist(b, offset_frame, many):
     """Compute the twist of body b from its momenta."""
@@ -115,7 +130,7 @@ def revert_to_dissipative(n, offset_frame, many):
         put_vector(many.bodies.state, b, at.ANGMOM, row_vector(many.bodies.momenta, b, LOADED_MOMENTA + 3))
         update_twist(b, offset_frame, many)
     for k in range(n):
-        put_vector(many.contacts.target, k, 0, (min(many.contacts.target[k, 0], 0.0), 0.0, 0.0))
+        put_vector(many.contacts.target, k, 0, (dissipative_target(k, many), 0.0, 0.0))
 
 
 @inlined

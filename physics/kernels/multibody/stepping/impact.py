@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data import warm_start as kept
@@ -44,6 +44,16 @@ _UNCONSTRAINED = 1.0e300
 FORETOLD = -1.0e299
 
 
+def _same_limit(k, fast, h, many):
+    return fast
+
+
+@if_given("many.compliance", _same_limit)
+def _limit_at_springs(k, fast, h, many):
+    """Speed that closes a slop within h [s], instead of the limit `fast`: springs and dampers act from contact on."""
+    return pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many) / h
+
+
 @inlined
 def impact_speed_limit(k, h, many):
     """Least approach speed of contact k for which a stage must end at the time of impact [m/s].
@@ -56,7 +66,7 @@ def impact_speed_limit(k, h, many):
     fast = _FAST_RADIUS_SHARE * radius / h
     if many.settings[0].is_error_controlled == 1:
         fast = min(fast, rest_speed_limit(k, h, many))
-    return fast
+    return _limit_at_springs(k, fast, h, many)
 
 
 @inlined
@@ -227,7 +237,7 @@ def constrain_coupled_contacts(n, many):
 
 
 @kernel
-def resolve_impacts(n, world, t, h, is_last, switches, records, many):
+def _resolve_rigid_impacts(n, world, t, h, is_last, switches, records, many):
     """Apply the impulses of an impact if contacts cause one: (contacts in the set, time, whether there was one).
 
     The time [s] is a lower bound of that until the next impact (`time_to_first_impact`). n is the number of contacts in
@@ -251,6 +261,30 @@ def resolve_impacts(n, world, t, h, is_last, switches, records, many):
     if records.log.shape[1] > 0:
         log_impacts(n, world, t, many, records.log, records.counts)
     return n, meeting, True
+
+
+def _with_impacts(n, world, t, h, is_last, switches, records, many):
+    return _resolve_rigid_impacts(n, world, t, h, is_last, switches, records, many)
+
+
+@if_given("many.compliance", _with_impacts)
+def resolve_impacts(n, world, t, h, is_last, switches, records, many):
+    """Leave all contacts to the resting stage: (contacts in the set, time to the next meeting, False).
+
+    Compliant contacts have no impacts. Open ones that close later are left out of the stage, which ends before they do.
+    Rigid contacts are served by `_resolve_rigid_impacts`, whose arguments these are.
+    """
+    for k in range(n):
+        put_vector(many.contacts.target, k, 0, (0.0, 0.0, 0.0))
+        put_vector(many.contacts.impulse, k, 0, (0.0, 0.0, 0.0))
+        clear_torque(k, many)
+        slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
+        is_ahead = is_left_to_advancement(k, many) or (not is_last and is_impact_ahead(k, h, many))
+        if many.contacts.gap[k] > slop and is_ahead:
+            many.contacts.target[k, 0] = -_UNCONSTRAINED
+    constrain_coupled_contacts(n, many)
+    meeting = time_to_first_impact(n, h, is_last, many)
+    return drop_unconstrained(n, many), meeting, False
 
 
 @inlined

@@ -56,6 +56,7 @@ from physics.kernels.multibody.data.rolling_points import (
     rolling_rate,
     rolls_on_rim,
 )
+from physics.kernels.multibody.stepping.compliant_stage import aim_at_springs, foretell_end_gaps, split_stage
 from physics.kernels.multibody.stepping.energy_budget import (
     has_gained_energy,
     revert_to_dissipative,
@@ -213,6 +214,17 @@ def set_resting_targets(n, h, many):
         put_vector(many.contacts.target, k, 0, t)
 
 
+@if_given("many.compliance")
+def set_spring_targets(n, before, after, many):
+    """Set the normal targets of the n contacts in a stage with drifts of `before` and `after` [s] (`compliant_stage`).
+
+    Those along the contact planes stay, as `set_resting_targets` has set them.
+    """
+    for k in range(n):
+        turning = _turning(k, moving_body_at(many.contacts.bodies[k, 1], many), 2.0 * after, many)[0]
+        aim_at_springs(k, -turning / after, before, after, many)
+
+
 @inlined
 def hold_all_loads(h, gyroscopic, offset_frame, many):
     """Evaluate the loads at the middle of a stage of length h [s], and hold them over the stage, for every body.
@@ -265,7 +277,8 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     If the impulses raise the energy, the contact problem is solved again with targets that cannot, and then, if need
     be, without friction. Arguments are those of `midpoint_step`.
     """
-    half, first = 0.5 * h, world * many.bodies.state.shape[0]
+    before, after = split_stage(n, world, h, records.memory, many)
+    first = world * many.bodies.state.shape[0]
     for b in range(many.bodies.state.shape[0]):
         if is_asleep(first + b, sleep) or is_fixed(b, many.bodies):
             continue
@@ -277,20 +290,21 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
                 integrate_flight(read_state(many.bodies.state, b), h, flight, many.bodies.body[b]),
             )
             continue
-        drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+        drift_body(b, before, switches.flight.gyroscopic, switches.flight.offset_frame, many)
         update_body_pose(b, switches.flight.offset_frame, many)
         _, q, _, L = read_state(many.bodies.state, b)
         put_vector(many.bodies.twist, b, 3, angular_velocity(q, L, many.bodies.body[b], switches.flight.offset_frame))
-    move_driven_bodies(half, switches.flight.offset_frame, many)
+    move_driven_bodies(before, switches.flight.offset_frame, many)
     if n == 0:
-        move_driven_bodies(half, switches.flight.offset_frame, many)
+        move_driven_bodies(after, switches.flight.offset_frame, many)
         kept.clear_awake_warm_start(world, h, sleep, records.memory, many)
         return
     update_contacts(many)
-    follow_edges(n, half, many)
-    take_later_velocities(n, half, many)
+    follow_edges(n, before, many)
+    take_later_velocities(n, after, many)
     foretell_twist(n, world, h, switches, records.memory, many)
     set_resting_targets(n, h, many)
+    set_spring_targets(n, before, after, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
             body = many.bodies.body[b]
@@ -309,18 +323,21 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     )
     many.settings[0].load_speed = max_load_speed(h, many)
     solve_and_apply(n, world, switches.friction, records.report, many)
+    foretell_end_gaps(n, after, many)
     if has_gained_energy(n, h, many):
         revert_to_dissipative(n, switches.flight.offset_frame, many)
         solve_and_apply(n, world, switches.friction, records.report, many)
+        foretell_end_gaps(n, after, many)
         if has_friction(switches) and has_gained_energy(n, h, many):
             revert_to_dissipative(n, switches.flight.offset_frame, many)
             solve_frictionless_and_apply(n, many)
+            foretell_end_gaps(n, after, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
     kept.store_warm_impulses(n, world, h, sleep, records.memory, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:
-            drift_body(b, half, switches.flight.gyroscopic, switches.flight.offset_frame, many)
-    move_driven_bodies(half, switches.flight.offset_frame, many)
+            drift_body(b, after, switches.flight.gyroscopic, switches.flight.offset_frame, many)
+    move_driven_bodies(after, switches.flight.offset_frame, many)
 
 
 @if_given("many.driven")

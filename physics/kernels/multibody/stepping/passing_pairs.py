@@ -22,6 +22,7 @@ from physics.kernels.math.vector import as_vector, row_vector
 from physics.kernels.multibody.data import warm_start as kept
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS
 from physics.kernels.multibody.data.capsules import half_length, is_capsule
+from physics.kernels.multibody.data.compliance import is_pressed_in
 from physics.kernels.multibody.data.contact_set import (
     DEEP_SHARE,
     FEATURES_PER_PAIR,
@@ -134,7 +135,8 @@ def _moves_as_foreseen(a, b, gap, n, h, many):
 def _is_stopping(k, h, many):
     """True if contact k of two bodies would stop them within h [s]; see `contact_set.is_stopping`."""
     slop = pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
-    return is_stopping(many.contacts.gap[k], many.contacts.speed[k], slop, h)
+    gap = many.contacts.gap[k]
+    return is_stopping(gap, many.contacts.speed[k], slop, h) and not is_pressed_in(gap, many)
 
 
 @inlined

@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, pu
 from physics.kernels.multibody.data.kinematics import update_body_pose
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 from physics.kernels.multibody.solver.islands import union_contacts
+from physics.kernels.multibody.stepping.compliant_stage import correction_of, measure_from_due_depth
 from physics.kernels.multibody.stepping.energy_budget import (
     cap_rotational_energy,
     clamp_body_inside_walls,
@@ -63,6 +64,7 @@ def _set_displacement_targets(n, many):
         goal = -max(gap, 0.0)
         if gap < -slop:
             goal = -_CORRECTION_SHARE * (gap + 0.5 * slop)
+            goal = correction_of(gap, goal, many)
             largest, least = max(largest, goal), min(least, slop)
         deepest = max(deepest, -gap / slop)
         put_vector(many.contacts.target, k, 0, (goal, 0.0, 0.0))
@@ -234,6 +236,7 @@ def _correct_once(n, offset_frame, many):
     Arms and gaps are first updated to the bodies' present places.
     """
     update_contacts(many)
+    measure_from_due_depth(n, many)
     deepest, error = _set_displacement_targets(n, many)
     if not deepest > 1.0:
         return deepest

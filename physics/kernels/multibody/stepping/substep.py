@@ -24,7 +24,7 @@ No body passes through another one, however fast: a speculative contact bounds t
 
 from __future__ import annotations
 
-from physics.compiler.decorators import inlined, kernel
+from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
@@ -58,6 +58,16 @@ SPLITS_PER_IMPACT = 4
 OVERLAP_SHARE = 1.0e-2
 
 
+def _share_of_rigid(many):
+    return OVERLAP_SHARE
+
+
+@if_given("many.compliance", _share_of_rigid)
+def _overlap_share(many):
+    """Depth from which bodies count as overlapping [smaller bounding radii]: compliant ones may be as deep as that."""
+    return 1.0
+
+
 @inlined
 def record_penetration(n, world, memory, report, many):
     """Record the deepest penetration of the n contacts, and the contacts that found no room, in the world's report.
@@ -69,7 +79,7 @@ def record_penetration(n, world, memory, report, many):
         depth = -many.contacts.gap[k]
         report[world, at.PENETRATION] = max(report[world, at.PENETRATION], depth)
         a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
-        if is_start and body_at(b, many) >= 0 and depth > OVERLAP_SHARE * smaller_radius(a, b, many):
+        if is_start and body_at(b, many) >= 0 and depth > _overlap_share(many) * smaller_radius(a, b, many):
             report[world, at.OVERLAP] = max(report[world, at.OVERLAP], depth)
     report[world, at.CONTACTS_LEFT_OUT] += many.counts[NUM_DROPPED]
     many.counts[NUM_DROPPED] = 0
