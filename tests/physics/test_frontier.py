@@ -195,6 +195,13 @@ def test_energy_is_conserved_or_never_rises():
         assert found == pytest.approx(error, nan_ok=True)
 
 
+def test_a_driven_body_may_add_energy():
+    belt = physics.Block((4, 1, 2), fixed=True, motion=physics.Motion(surface_velocity=(1, 0, 0)))
+    crate = physics.Block((1, 1, 1), 1.0, pos=(0, 1, 0))
+    scene = physics.Scene([belt, crate], effects=[physics.Contact(), physics.Friction(0.5)])
+    assert math.isnan(frontier_errors.energy_error(scene, np.array([[0.0, 0.0], [0.0, 0.5]])))
+
+
 def test_events_are_paired_where_both_have_as_many():
     def event(t, kind):
         return SimpleNamespace(t=t, kind=kind)
