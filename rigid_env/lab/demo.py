@@ -29,8 +29,8 @@ REST_SPEED = 1e-6  # speed below which a body is at rest [m/s, rad/s]
 def energy_sources(scene: physics.Scene) -> list[str]:
     """Names of everything in a scene that may give energy to its bodies; their work is not counted.
 
-    These are driven bodies, and fields that do not say that they take energy or leave it (`Field.takes_energy`). Springs
-    between bodies are none of them: both ends are bodies of the scene.
+    These are driven bodies, and fields that do not say that they take energy or leave it (`Field.takes_energy`).
+    Springs between bodies are none of them: both ends are bodies of the scene.
     """
     driven = ["driven bodies"] if any(body.motion is not None for body in scene.bodies) else []
     fields = (each for each in scene.effects if isinstance(each, physics.Field))
