@@ -29,13 +29,13 @@ def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     path : str or Path
         Path of the file.
     drop : bool
-        Whether to leave out effects that MJCF cannot express, instead of refusing the scene. A comment in the file
-        names them.
+        Whether to leave out effects, fields and sensors that MJCF cannot express, instead of refusing the scene. A
+        comment in the file names them. A body with a motion is written, and stands still.
 
     Raises
     ------
     ValueError
-        The scene has effects that MJCF cannot express, and `drop` is False. The message names them.
+        The scene has something that MJCF cannot express, and `drop` is False. The message names it.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     validation.path(path)
