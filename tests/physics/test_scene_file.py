@@ -90,6 +90,10 @@ MISTAKES = [
         BALL + "[[effects]]\nkind = 'Gravity'\n[[effects]]\nkind = 'Push'\nbody = 4\n",
         "line 7: Push.body is 4; allow",
     ),
+    (
+        BALL + "name = 'ball'\n[[effects]]\nkind = 'Push'\nbody = 'bal'\n",
+        "line 6: Push.body is 'bal'; allowed are ball",
+    ),
     (BALL + "name = ' '\n", r"line 5: bodies\[0\]: name is ' '; allowed are printable characters"),
     (
         BALL + "name = 'a'\n" + BALL + "name = 'a'\n",
