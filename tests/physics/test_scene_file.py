@@ -57,9 +57,9 @@ MISTAKES = [
         r"line 6: bodies\[1\]: kind is 'Cube'; allowed are Block, Sphere",
     ),
     (BALL + "colour = 1\n", r"line 5: bodies\[0\]: colour is not known; allowed are .*radius"),
-    (BALL + "pos = [1, 2]\n", r"line 5: bodies\[0\]: pos has shape \(2,\)"),
+    (BALL + "pos = [1, 2]\n", r"line 5: bodies\[0\]: Sphere.pos has shape \(2,\)"),
     ('[[bodies]]\nkind = "Sphere"\nmass = 2\n', r"line 1: bodies\[0\]: radius is missing"),
-    ("\n" + BALL.replace("mass = 2", "mass = -2"), r"line 5: bodies\[0\]: mass is -2"),
+    ("\n" + BALL.replace("mass = 2", "mass = -2"), r"line 5: bodies\[0\]: Sphere.mass is -2"),
     (BALL + "[[walls]]\noffset = 1\n", r"line 5: walls\[0\]: normal is missing"),
     (BALL + "[[effects]]\nkind = 'Drag'\n\nlinear = -1\n", r"line 8: effects\[0\]: Drag.linear is -1"),
     (BALL + "[[effects]]\nkind = 'Friction'\n", "Friction without Contact"),
@@ -75,15 +75,15 @@ MISTAKES = [
     (BALL + "[[effects]]\nradius = 3\n", r"line 5: effects\[0\]: kind is missing; allowed are Gravity, "),
     (BALL + "[[walls]]\nnormal = [0, 1, 0]\nofset = 1\n", r"line 7: walls\[0\]: ofset .*; allowed are offset, normal"),
     (BALL + "[[walls]]\nnormal = 'up'\n", r"line 6: walls\[0\]: HalfSpace.normal is 'up'; allowed are numbers"),
-    (BALL + "quat = [1, 1, 0, 0]\n", r"line 5: bodies\[0\]: quat is .* of norm 1.41421; allowed are unit quat"),
-    (BALL + "pos = [0, true, 1]\n", r"line 5: bodies\[0\]: pos is \[0, True, 1\]; allowed are numbers"),
+    (BALL + "quat = [1, 1, 0, 0]\n", r"line 5: bodies\[0\]: Sphere.quat is .* of norm 1.41421; allowed are unit quat"),
+    (BALL + "pos = [0, true, 1]\n", r"line 5: bodies\[0\]: Sphere.pos is \[0, True, 1\]; allowed are numbers"),
     ("format = true\n" + BALL, "line 1: format is True; allowed is 1"),
     ("[bodies]\nkind = 'Sphere'\n", r"line 1: bodies is \{'kind': 'Sphere'\}; allowed are tables \[\[bodies\]\]"),
     (
         '[[bodies]]\nkind = "Sphere"\nradius = 1\n',
-        r"line 1: bodies\[0\]: mass is None and density is None; allowed is",
+        r"line 1: bodies\[0\]: Sphere.mass is None and density is None; allowed is",
     ),
-    (BALL + "density = 2\n", r"line 4: bodies\[0\]: mass is 2 and density is 2; allowed is exactly one"),
+    (BALL + "density = 2\n", r"line 4: bodies\[0\]: Sphere.mass is 2 and density is 2; allowed is exactly one"),
     (BALL + "[[effects]]\nkind = 'Gravity'\n" * 2, "line 7: Scene.effects holds 2 Gravity; allowed is one"),
     (BALL + "[[effects]]\nkind = 'Friction'\n", "line 5: Scene.effects holds Friction without Contact; add"),
     (
@@ -94,14 +94,14 @@ MISTAKES = [
         BALL + "name = 'ball'\n[[effects]]\nkind = 'Push'\nbody = 'bal'\n",
         "line 6: Push.body is 'bal'; allowed are ball",
     ),
-    (BALL + "name = ' '\n", r"line 5: bodies\[0\]: name is ' '; allowed are printable characters"),
+    (BALL + "name = ' '\n", r"line 5: bodies\[0\]: Sphere.name is ' '; allowed are printable characters"),
     (
         BALL + "name = 'a'\n" + BALL + "name = 'a'\n",
         r"line 6: Scene.bodies\[1\] has the name 'a', as Scene.bodies\[0\]; allowed are different names",
     ),
     (BALL + "[enviroment]\n", "line 5: enviroment is not known; allowed are environment, format, bodies"),
     (BALL + "[[environment]]\n", r"line 5: environment is \[\{\}\]; allowed is a table \[environment\]"),
-    ("bodies = [{kind = 'Sphere', radius = 1, mass = 0}]", r"line 1: bodies\[0\]: mass is 0.0; allowed are"),
+    ("bodies = [{kind = 'Sphere', radius = 1, mass = 0}]", r"line 1: bodies\[0\]: Sphere.mass is 0.0; allowed are"),
 ]
 
 

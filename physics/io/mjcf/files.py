@@ -80,6 +80,9 @@ def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list
     validation.path(path)
     try:
         text = Path(path).read_text(encoding="utf-8")
+    except IsADirectoryError as error:
+        told = f"path is {str(path)!r}, which is a folder; allowed is a file in MJCF (.xml)"
+        raise IsADirectoryError(error.errno, told) from None
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in MJCF") from None
     scene, left = read_mjcf(text, str(path), drop, Path(path))
