@@ -33,6 +33,9 @@ UNIT_ROUNDING = 4 * np.finfo(float).eps
 # Largest count: it fits into every type of integer in which a count is stored.
 MOST = 2**31 - 1
 
+# A message shows all numbers of an array that has at most so many of them.
+MOST_SHOWN = 9
+
 FLOAT64 = np.dtype(np.float64)
 
 
@@ -84,7 +87,7 @@ def shaped(value: ArrayLike, shape: tuple[int, ...], field: str) -> np.ndarray:
     array = floats(value, field, f"are numbers in shape {shape}" if shape else "is one number")
     if array.shape != shape:
         allowed = f"shape {shape}" if shape else "one number"
-        raise ValueError(f"{field} {_given(array)}; allowed is {allowed}")
+        raise ValueError(f"{field} {_given(array)}; allowed is {allowed}{_if_short(array)}")
     return array
 
 
@@ -118,12 +121,17 @@ def batch(value: ArrayLike, shape: tuple[int, int, int], field: str) -> np.ndarr
     allowed = " or ".join(map(str, dict.fromkeys((*alone, (bodies, size), shape))))
     if array is None:
         raise ValueError(f"{field} is {shown(value)}; allowed are numbers in shape {allowed}")
-    raise ValueError(f"{field} {_given(array)}; allowed is shape {allowed}")
+    raise ValueError(f"{field} {_given(array)}; allowed is shape {allowed}{_if_short(array)}")
 
 
 def _given(array: np.ndarray) -> str:
     """Describe an array of a wrong shape for a message: ``has shape ...``, or ``is ...`` for a single number."""
     return f"has shape {array.shape}" if array.ndim else f"is {shown(array)}"
+
+
+def _if_short(array: np.ndarray) -> str:
+    """Words that end a message about the shape of an array: its numbers, if they are few; "" for a single number."""
+    return f"; given: {shown(array.tolist())}" if array.ndim and array.size <= MOST_SHOWN else ""
 
 
 def take_finite(value: ArrayLike, target: np.ndarray, field: str) -> None:
@@ -155,7 +163,7 @@ def _bad(array: np.ndarray, good: np.ndarray, field: str, allowed: str) -> Value
     `good` is a bool array of the same shape. The message calls the array `field` and ends with "allowed" and the words
     `allowed`.
     """
-    if array.size <= 9:
+    if array.size <= MOST_SHOWN:
         return ValueError(f"{field} is {shown(array)}; allowed {allowed}")
     place = np.unravel_index(int(np.argmin(good)), array.shape)
     return ValueError(f"{field}[{', '.join(map(str, map(int, place)))}] is {shown(array[place])}; allowed {allowed}")

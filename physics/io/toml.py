@@ -119,6 +119,9 @@ def load_file(path: str | Path, kinds: Sequence[type[Field]] = ()) -> SceneFile:
     except FileNotFoundError as error:
         told = f"path is {str(path)!r}, which does not exist; allowed is a scene file (.toml)"
         raise FileNotFoundError(error.errno, told) from None
+    except IsADirectoryError as error:
+        told = f"path is {str(path)!r}, which is a folder; allowed is a scene file (.toml)"
+        raise IsADirectoryError(error.errno, told) from None
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in TOML") from None
     return file_from_toml(text, str(path), kinds)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -67,6 +70,25 @@ else:
     _Shape = object
 
 
+def _telling_itself(check: Callable) -> Callable:
+    """Wrap the `__post_init__` of a body: an error about a field tells the class, and the name of the body."""
+
+    @functools.wraps(check)
+    def checked(self) -> None:
+        try:
+            check(self)
+        except ValueError as error:
+            told = re.match(r"(\w+)(\[[^]]*\])?(\.\w+)?", str(error))
+            if told is None or told.group(1) not in self.__dataclass_fields__:
+                raise
+            is_named = isinstance(self.name, str) and told.group(1) != "name"
+            owner = f" of {shown(self.name)}" if is_named else ""
+            message = f"{type(self).__name__}.{told.group()}{owner}{str(error)[told.end() :]}"
+            raise ValueError(message) from None
+
+    return checked
+
+
 def body_repr(body: Body) -> str:
     """`repr` of a body, an expression that makes it again: the infinite mass of a fixed one is left out."""
     return fields_repr(body, omitted=("mass",) if body.fixed else ())
@@ -123,6 +145,11 @@ class Body(_Shape):
     mask: int = field(default=MASK, metadata=SHOWN_IF_GIVEN)
     motion: Motion | None = field(default=None, metadata=SHOWN_IF_GIVEN)
     center = (0.0, 0.0, 0.0)  # of the shape, from the centre of mass; a block may have another
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if "__post_init__" in vars(cls):
+            cls.__post_init__ = _telling_itself(cls.__post_init__)  # type: ignore[method-assign]
 
     def _repr_html_(self) -> str:
         return fields_table(self, omitted=("mass",) if self.fixed else ())

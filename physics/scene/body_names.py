@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from physics.keywords import nearest_first
-from physics.scene.scene import Scene
 from physics.summary import shown
+
+if TYPE_CHECKING:
+    from physics.scene.scene import Scene
 
 
 def body_index(value, field: str, scene: Scene, verb: str = "is") -> int:

@@ -26,7 +26,7 @@ from physics.scene.force_field import Field
 from physics.scene.groups import GROUP, MASK, check_groups
 from physics.scene.materials import check_materials
 from physics.scene.sensor import Sensor, carrier_index
-from physics.scene.springs import check_ends
+from physics.scene.springs import check_ends, with_indices
 from physics.summary import SCREEN, SHOWN_IF_GIVEN, counted, fields_repr, parts_repr, shown
 
 # An axis of friction and the normal of a wall count as parallel if the sine of the angle between them is below this.
@@ -176,6 +176,7 @@ class Scene:
         if all(body.fixed for body in self.bodies):
             raise ValueError("Scene.bodies holds only fixed bodies; allowed is at least one body that is not fixed")
         self._check_names()
+        object.__setattr__(self, "effects", tuple(with_indices(effect, self) for effect in self.effects))
         kinds = [type(effect) for effect in self.effects]
         for kind in set(kinds):
             if kinds.count(kind) > 1 and not getattr(kind, "has_many", False):

@@ -6,7 +6,7 @@ Formulas and sources are in `physics.kernels.forces`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -17,7 +17,37 @@ from physics.annotations import Frame, Vector
 from physics.kernels.forces import implicit_two_body_spring, spring, two_body_spring
 from physics.keywords import known_keywords
 from physics.rotations import rotation_matrices
+from physics.scene.body_names import body_index
 from physics.scene.force_field import Checked, Field
+
+if TYPE_CHECKING:
+    from physics.scene.scene import Scene
+
+
+def _take_end(effect: Any, name: str) -> None:
+    """Check the field `name` of a spring or a push, an index or a name of a body; make an index an int."""
+    value = getattr(effect, name)
+    if not isinstance(value, str):
+        object.__setattr__(effect, name, validation.count(value, f"{type(effect).__name__}.{name}", least=0))
+
+
+def with_indices(effect: Any, scene: Scene) -> Any:
+    """Replace names of bodies in a spring or a push by indices in `scene.bodies`; other effects are returned as given.
+
+    Raises
+    ------
+    ValueError
+        The scene has no such body, or both ends of a spring are the same.
+    """
+    if not isinstance(effect, (Spring, Push)):
+        return effect
+    ends: dict[str, Any] = {name: getattr(effect, name, None) for name in ("body", "other")}
+    named: dict[str, Any] = {
+        name: body_index(end, f"{type(effect).__name__}.{name}", scene)
+        for name, end in ends.items()
+        if isinstance(end, str)
+    }
+    return replace(effect, **named) if named else effect
 
 
 def _check_body(effect: Any, body_count: int, name: str) -> None:
@@ -66,10 +96,11 @@ class Spring(Checked):
         Damping constant c [N s/m].
     length : float
         Rest length l0 [m].
-    body : int
-        Index of the body in `Scene.bodies`.
-    other : int or None
-        Index of another body that holds the anchor and gets the opposite force. None: the anchor is fixed in the world.
+    body : int or str
+        Index of the body in `Scene.bodies`, or its name, which a `Scene` replaces by the index.
+    other : int, str or None
+        Index or name of another body that holds the anchor and gets the opposite force. None: the anchor is fixed in
+        the world.
     """
 
     anchor: Vector = (0.0, 0.0, 0.0)
@@ -89,8 +120,8 @@ class Spring(Checked):
             stiffness: float = 100.0,
             damping: float = 0.0,
             length: float = 0.0,
-            body: int = 0,
-            other: int | None = None,
+            body: int | str = 0,
+            other: int | str | None = None,
         ) -> None: ...
 
     function: ClassVar[Any] = spring.spring
@@ -105,11 +136,11 @@ class Spring(Checked):
         self._set("point", validation.finite, (3,))
         for name in ("stiffness", "damping", "length"):
             self._set(name, validation.non_negative)
-        validation.count(self.body, "Spring.body", least=0)
+        _take_end(self, "body")
         if self.other is not None:
-            validation.count(self.other, "Spring.other", least=0)
+            _take_end(self, "other")
             if self.other == self.body:
-                raise ValueError(f"Spring.other is {self.other}, as Spring.body; allowed are other bodies and None")
+                raise ValueError(f"Spring.other is {self.other!r}, as Spring.body; allowed are other bodies and None")
 
     def check(self, body_count: int) -> None:
         _check_body(self, body_count, "body")
@@ -166,8 +197,8 @@ class Push(Checked):
         Point at which the force acts: body frame, from the centre of mass [m].
     frame : {"world", "body"}
         Frame of `force`. In the body frame the force turns with the body, like the thrust of a rocket.
-    body : int
-        Index of the body in `Scene.bodies`.
+    body : int or str
+        Index of the body in `Scene.bodies`, or its name, which a `Scene` replaces by the index.
     """
 
     force: Vector = (0.0, 0.0, 0.0)
@@ -182,7 +213,7 @@ class Push(Checked):
             force: ArrayLike = ...,
             point: ArrayLike = ...,
             frame: Frame = "world",
-            body: int = 0,
+            body: int | str = 0,
         ) -> None: ...
 
     function: ClassVar[Any] = spring.push_load
@@ -194,7 +225,7 @@ class Push(Checked):
         self._set("force", validation.finite, (3,))
         self._set("point", validation.finite, (3,))
         validation.one_of(self.frame, ("world", "body"), "Push.frame")
-        validation.count(self.body, "Push.body", least=0)
+        _take_end(self, "body")
 
     def check(self, body_count: int) -> None:
         _check_body(self, body_count, "body")

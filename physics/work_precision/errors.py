@@ -90,10 +90,10 @@ def energy_error(scene: Scene, energy: np.ndarray) -> float:
     """Error of the `energy` [J] (samples, bodies) against the scene's law of energy, in J.
 
     If the scene conserves energy, it is the largest departure of a body's energy from the start. Else it is the largest
-    rise above an earlier value; a passive scene never has one. Bodies must not exchange energy. NaN if a field may add
-    energy.
+    rise above an earlier value; a passive scene never has one. Bodies must not exchange energy. NaN if a field or
+    a driven body may add energy.
     """
-    if None in _field_laws(scene):
+    if None in _field_laws(scene) or any(body.motion is not None for body in scene.bodies):
         return float("nan")
     if conserves_energy(scene):
         return float(np.abs(energy - energy[0]).max())

@@ -136,27 +136,56 @@ class Frontier:
     # --- answers -----------------------------------------------------------------------------------------------
 
     def cheapest(self, error: float, measure: str | None = None, engine: str | None = None) -> FrontierPoint | None:
-        """Quickest point whose error is at most `error`; None if there is none, or if `error` is below the truth's own.
+        """Quickest point whose error is at most `error`, there and at all finer steps of its setting; else None.
 
-        `advice` tells the reason.
+        A coarse step that is right by luck is not taken. None also if `error` is below the truth's own
+        error. `advice` tells the reason.
         """
         error = float(validation.positive(error, (), "error"))
-        good = [p for p in self.front(measure, engine) if max(self.error(p, measure), self.own_error(measure)) <= error]
+        good = [p for p in self._below(error, measure, engine) if not self._finer_above(p, error, measure)]
         return good[0] if good else None
 
     def advice(self, error: float, measure: str | None = None, engine: str | None = None) -> str:
-        """Sentence about the quickest point with an error of at most `error`, or the reason why there is none."""
+        """Sentence about the quickest point with an error of at most `error`, or the reason why there is none.
+
+        It names a quicker point that is not taken because a finer step of its setting is above that error.
+        """
         point, unit = self.cheapest(error, measure, engine), self.units[self._measure(measure)]
         goal = f"{error:g} {unit}".rstrip()
+        quickest = next(iter(self._below(error, measure, engine)), None)
+        lucky = self._told_luck(quickest, error, measure) if quickest is not None and quickest is not point else ""
         if point is not None:
-            return f"below {goal}: {point}, error {self.error(point, measure):.2g}, {1e6 * point.cost:.0f} µs per s"
+            told = f"below {goal}: {point}, error {self.error(point, measure):.2g}, {1e6 * point.cost:.0f} µs per s"
+            return f"{told}; not {lucky}" if lucky else told
         if self.own_error(measure) > error:
             return f"below {goal}: cannot be shown, the truth itself is known to {self.own_error(measure):.2g} only"
+        if lucky:
+            return f"below {goal}: no setting that was measured at all its finer steps; not {lucky}"
         front = self.front(measure, engine)
         if not front:
             return f"below {goal}: no setting that was measured; all of them are lost"
         best = self.error(front[-1], measure)
         return f"below {goal}: no setting that was measured; the best is {front[-1]}, error {best:.2g}"
+
+    def _below(self, error: float, measure: str | None, engine: str | None) -> list[FrontierPoint]:
+        """Points whose error, and that of the truth, is at most `error`, the quickest first."""
+        if self.own_error(measure) > error:
+            return []
+        some = (p for p in self.of(engine=engine) if not p.is_lost and self.error(p, measure) <= error)
+        return sorted(some, key=lambda p: (p.cost, self.error(p, measure)))
+
+    def _finer_above(self, point: FrontierPoint, error: float, measure: str | None) -> list[FrontierPoint]:
+        """Points with finer steps of the same engine and setting that are lost or above `error`, coarsest first."""
+        finer = (p for p in self.of(point.setting, point.engine) if p.dt < point.dt)
+        return [p for p in finer if p.is_lost or self.error(p, measure) > error]
+
+    def _told_luck(self, point: FrontierPoint, error: float, measure: str | None) -> str:
+        """Words about a point below `error` that is not taken, with the error of the next finer step above it."""
+        above = self._finer_above(point, error, measure)[0]
+        there = "is lost" if above.is_lost else f"has {self.error(above, measure):.2g}"
+        return (
+            f"{point}, error {self.error(point, measure):.2g} by luck: the finer step of {1e3 * above.dt:g} ms {there}"
+        )
 
     def order(self, setting: object, measure: str | None = None, engine: str = OURS) -> float | None:
         """Observed order of a setting: slope of log error over log step where the error falls; None if it has none."""

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from physics import validation
+from physics.annotations import End
 from physics.html_table import parts_table
 from physics.kernels.multibody.data.hull_tables import CUBE
 from physics.kernels.queries.nearest_queries import Found
 from physics.kernels.state.layout import SPHERE
 from physics.scene.bodies import Body
+from physics.scene.pairs import end_index
 from physics.scene.parts import SHAPE_CODES, with_parts
 from physics.scene.scene import Scene
 from physics.summary import parts_repr, shown
 from physics.world.query_arguments import result
 from physics.world.query_calls import CAPSULE
+
+Ends = ArrayLike | Sequence[End]
+"""Type of an argument: a name or an index of a body or a wall, or a list of them."""
 
 # A point: a sphere without radius, its bounding radius, its centre and its polyhedron.
 _POINT = (SPHERE, (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), None)
@@ -70,9 +76,9 @@ def nearest_result(out: Nearest | None, worlds: int, rows: int) -> tuple[Nearest
     return found, Found(found.gap.reshape(-1), found.other.reshape(-1), *rest)
 
 
-def pairs_of(first: ArrayLike, second: ArrayLike, bodies: int, walls: int) -> tuple[np.ndarray, np.ndarray]:
-    """Check pairs of bodies, or of bodies and walls (-1 - k), and return both as (pairs,) int64."""
-    a, b = _indices(first, "first", 0, bodies), _indices(second, "second", -walls, bodies)
+def pairs_of(first: Ends, second: Ends, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Check pairs of bodies, or of bodies and walls (names, or -1 - k), and return both as indices (pairs,) int64."""
+    a, b = _indices(first, "first", 0, scene), _indices(second, "second", -len(scene.walls), scene)
     if len(a) != len(b) and 1 not in (len(a), len(b)):
         raise ValueError(f"first has {len(a)} bodies and second has {len(b)}; allowed are as many, or one")
     a, b = (np.ascontiguousarray(part) for part in np.broadcast_arrays(a, b))
@@ -81,18 +87,28 @@ def pairs_of(first: ArrayLike, second: ArrayLike, bodies: int, walls: int) -> tu
     return a, b
 
 
-def _indices(value: ArrayLike, field: str, least: int, count: int) -> NDArray[np.int64]:
+def _indices(value: Ends, field: str, least: int, scene: Scene) -> NDArray[np.int64]:
+    count, numbers = len(scene.bodies), _numbered(value, field, scene)
     try:
-        array = np.atleast_1d(np.asarray(value))
+        array = np.atleast_1d(np.asarray(numbers))
     except ValueError:  # ragged
         array = np.zeros(0)
     if array.ndim != 1 or array.dtype.kind not in "iu":
-        raise ValueError(f"{field} is {shown(value)}; allowed is an index or a list of them")
+        raise ValueError(f"{field} is {shown(value)}; allowed is an index or a name, or a list of them")
     bad = (array < least) | (array >= count)
     if bad.any():
         walls = f", and from -1 to {least} for walls" if least else ""
         raise ValueError(f"{field} is {shown(value)}; allowed are indices from 0 to {count - 1}{walls}")
     return array.astype(np.int64)
+
+
+def _numbered(value: Ends, field: str, scene: Scene) -> Any:
+    """Replace names of bodies and walls in `value`, an end or a list of ends, by their indices."""
+    if isinstance(value, str):
+        return end_index(scene, value, field)
+    if isinstance(value, (list, tuple)):
+        return [end_index(scene, end, field) if isinstance(end, str) else end for end in value]
+    return value
 
 
 def attitudes(value: ArrayLike, worlds: int) -> NDArray[np.float64]:

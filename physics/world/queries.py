@@ -12,9 +12,19 @@ from physics.kernels.queries.nearest_queries import Pairs, Probe, measure_pairs,
 from physics.kernels.queries.ray_cast import NOTHING, Hits, Rays, cast_rays
 from physics.parallel.exclusive import exclusive
 from physics.scene.bodies import Body
+from physics.scene.body_names import body_index
 from physics.world import choice
 from physics.world.batch import Batch
-from physics.world.nearest import Nearest, attitudes, check_pairs, check_shape, nearest_result, pairs_of, shape_numbers
+from physics.world.nearest import (
+    Ends,
+    Nearest,
+    attitudes,
+    check_pairs,
+    check_shape,
+    nearest_result,
+    pairs_of,
+    shape_numbers,
+)
 from physics.world.query_arguments import common_count, largest_distance, result, row_steps, vectors
 from physics.world.query_calls import QueryCalls
 from physics.world.ray_hits import RayHits
@@ -30,8 +40,8 @@ class Querying(Batch):
         origins: ArrayLike,
         directions: ArrayLike,
         max_distance: float = math.inf,
-        carrier: int | None = None,
-        exclude: int | None = None,
+        carrier: int | str | None = None,
+        exclude: int | str | None = None,
         worlds: ArrayLike | None = None,
         out: RayHits | None = None,
     ) -> RayHits:
@@ -47,10 +57,11 @@ class Querying(Batch):
             same for all worlds; (3,) and (n, 1, 3): the same for all rays.
         max_distance : float
             Largest distance of a hit [m].
-        carrier : int, optional
-            Index of a body that carries the sensor: origins and directions are in its frame, from its centre of mass.
-        exclude : int, optional
-            Index of a body that rays pass through. None: the carrier, if there is one.
+        carrier : int or str, optional
+            Index or name of a body that carries the sensor: origins and directions are in its frame, from its centre of
+            mass.
+        exclude : int or str, optional
+            Index or name of a body that rays pass through. None: the carrier, if there is one.
         worlds : (n,) int array_like or (worlds,) mask, optional
             Indices of the worlds to ask, in this order; None: all.
         out : RayHits, optional
@@ -90,16 +101,16 @@ class Querying(Batch):
 
     @exclusive
     def measure_distances(
-        self, first: ArrayLike, second: ArrayLike, worlds: ArrayLike | None = None, out: Nearest | None = None
+        self, first: Ends, second: Ends, worlds: ArrayLike | None = None, out: Nearest | None = None
     ) -> Nearest:
         """Find the nearest points of pairs of bodies, or of bodies and walls, whether they may touch or not.
 
         Parameters
         ----------
-        first : (pairs,) int array_like or int
-            Indices of bodies.
-        second : (pairs,) int array_like or int
-            Indices of bodies, or -1 - k for wall k.
+        first : int, str or (pairs,) sequence of them
+            Indices or names of bodies.
+        second : int, str or (pairs,) sequence of them
+            Indices or names of bodies and walls; wall k has the index -1 - k.
         worlds : (n,) int array_like or (worlds,) mask, optional
             Indices of the worlds to ask, in this order; None: all.
         out : Nearest, optional
@@ -119,7 +130,7 @@ class Querying(Batch):
             Another thread is stepping or changing this world.
         """
         indices, asked = self._asked(worlds)
-        a, b = pairs_of(first, second, self.body_count, len(self.walls))
+        a, b = pairs_of(first, second, self.scene)
         check_pairs(a, b, self.scene)
         found, rows = nearest_result(out, asked, len(a))
         self._ask(measure_pairs, indices, Pairs(a, b), rows)
@@ -132,7 +143,7 @@ class Querying(Batch):
         pos: ArrayLike,
         quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         max_distance: float = math.inf,
-        exclude: int | None = None,
+        exclude: int | str | None = None,
         worlds: ArrayLike | None = None,
         out: Nearest | None = None,
     ) -> Nearest:
@@ -147,8 +158,8 @@ class Querying(Batch):
             the same for all worlds; (3|4,) and (n, 1, 3|4): the same for all poses.
         max_distance : float
             Largest gap of a result [m]; bodies farther away are left out, and cost less time.
-        exclude : int, optional
-            Index of a body that is left out.
+        exclude : int or str, optional
+            Index or name of a body that is left out.
         worlds : (n,) int array_like or (worlds,) mask, optional
             Indices of the worlds to ask, in this order; None: all.
         out : Nearest, optional
@@ -187,7 +198,7 @@ class Querying(Batch):
         pos: ArrayLike,
         quat: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         margin: float = 0.0,
-        exclude: int | None = None,
+        exclude: int | str | None = None,
         worlds: ArrayLike | None = None,
     ) -> NDArray[np.bool_]:
         """Test which poses of a shape touch or overlap a body or a wall: (n, poses) bool.
@@ -235,7 +246,9 @@ class Querying(Batch):
         indices = choice.world_indices(worlds, self.worlds, once=False)
         return indices, len(indices)
 
-    def _code(self, body: int | None, field: str) -> int:
+    def _code(self, body: int | str | None, field: str) -> int:
+        if isinstance(body, str):
+            return body_index(body, field, self.scene)
         return NOTHING if body is None else validation.index(body, self.body_count, field)
 
     def _ask(self, kernel, indices: np.ndarray | None, *question, solid=None) -> None:

@@ -15,7 +15,7 @@ from physics.scene.body_names import body_index, body_label
 from physics.scene.effects import RESISTANCES, Contact, Friction
 from physics.scene.force_field import Field, FieldSlot, write_columns
 from physics.scene.groups import may_meet
-from physics.scene.springs import check_ends
+from physics.scene.springs import check_ends, with_indices
 from physics.summary import shown
 from physics.world import choice, materials, motions, parameters
 from physics.world.batch import Batch
@@ -189,6 +189,7 @@ def _write_effects(world: Batch, chosen, params, effects) -> None:
     if isinstance(effects, (str, bytes)):
         raise ValueError(f"effects is {shown(effects)}; allowed is a list of effects")
     effects = tuple(effects) if isinstance(effects, Iterable) else (effects,)
+    effects = tuple(with_indices(effect, world.scene) for effect in effects)
     laws = [effect for effect in effects if isinstance(effect, (*RESISTANCES, Friction))]
     for effect in laws:
         if sum(type(effect) is type(other) for other in laws) > 1:

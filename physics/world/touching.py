@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from physics import validation
 from physics.keywords import known_keywords
 from physics.parallel.exclusive import exclusive
+from physics.scene.body_names import body_index
 from physics.schemes.contacts import EVERY_BODY, Contacts
 from physics.world import choice
 from physics.world.batch import Batch
@@ -27,7 +28,7 @@ class Touching(Batch):
     """Base of `World` with the methods that read contacts and impacts."""
 
     def read_contacts(
-        self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | None = None
+        self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | str | None = None
     ) -> Contacts:
         """Read the resting contacts of many worlds in their last step.
 
@@ -38,8 +39,8 @@ class Touching(Batch):
         rows : int, optional
             Largest number of contacts for each world; a world with more shows those with the largest forces. None: 12
             for each body, limited by the room of the contact memory.
-        body : int, optional
-            Index of a body: only its contacts are read, with it as their first body.
+        body : int or str, optional
+            Index or name of a body: only its contacts are read, with it as their first body.
 
         Returns
         -------
@@ -110,7 +111,7 @@ class Touching(Batch):
         self.is_plain = False
 
     def read_impacts(
-        self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | None = None
+        self, worlds: ArrayLike | None = None, rows: int | None = None, body: int | str | None = None
     ) -> Impacts:
         """Read the impacts of many worlds in their last step.
 
@@ -121,8 +122,9 @@ class Touching(Batch):
         rows : int, optional
             Largest number of pairs for each world; a world with more shows those with the largest impulses. None: as
             many as in `read_contacts`.
-        body : int, optional
-            Index of a body: only its pairs are read, with it as their first body. `Impacts.total` covers all bodies.
+        body : int or str, optional
+            Index or name of a body: only its pairs are read, with it as their first body. `Impacts.total` covers all
+            bodies.
 
         Returns
         -------
@@ -173,7 +175,9 @@ class Touching(Batch):
     def _chosen(self, worlds: ArrayLike | None) -> NDArray[np.int64]:
         return np.arange(self.worlds) if worlds is None else choice.world_indices(worlds, self.worlds, once=False)
 
-    def _body(self, body: int | None) -> int:
+    def _body(self, body: int | str | None) -> int:
+        if isinstance(body, str):
+            return body_index(body, "body", self.scene)
         return EVERY_BODY if body is None else validation.index(body, self.body_count, "body")
 
 

@@ -34,11 +34,13 @@ from physics.world.queries import Querying
 from physics.world.query_calls import QueryCalls
 from physics.world.report import StepReport
 from physics.world.scene_settings import scene_settings
+from physics.world.set_once import with_attributes_set_once
 from physics.world.snapshot import Snapshot
 from physics.world.stepper import kernel_calls, retime
 from physics.world.touching import Touching
 
 
+@with_attributes_set_once
 @known_keywords
 class World(Touching, Querying):
     """Batch of independent worlds of one scene, which are stepped together.
@@ -64,10 +66,12 @@ class World(Touching, Querying):
     ----------
     pos, quat, linvel, angvel : (worlds, bodies, 3|4|3|3) float64
         Read-only views in the world frame, refreshed in place by every step; copy them to keep them. PyTorch writes
-        into read-only memory: ``torch.tensor`` makes a copy that is safe, ``torch.from_numpy`` does not.
+        into read-only memory: ``torch.tensor`` makes a copy that is safe, ``torch.from_numpy`` does not. NumPy refuses
+        ``world.pos[0, 0, 0] = 3`` with "assignment destination is read-only": change them by `set_state`.
     time : float
         Time since the start [s].
 
+    An assignment to one of these arrays raises an AttributeError that names `set_state`, and likewise for others.
     `physics.world.batch.Batch` documents all other attributes.
 
     Raises

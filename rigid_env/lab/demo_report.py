@@ -26,9 +26,7 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
         console.print(event_table(summary["events"], names))
     else:
         say(console, "events", "none")
-    energy = summary["energy"]
-    told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
-    say(console, "energy", f"{told}, {energy['dissipated']:.4f} J dissipated")
+    say(console, "energy", _told_energy(summary["energy"]))
     final = summary["final"]
     _show_bodies(final, kinds, names, console)
     say(console, "at rest", "yes" if final["is_at_rest"] else "no")
@@ -39,6 +37,16 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
     effort = f"{status['solves']} contact problems, {status['iterations']} sweeps, {status['fallbacks']} by pivoting"
     worst = f"worst residual {status['residual']:.2g}, deepest penetration {status['penetration']:.2g} m"
     say(console, "", f"{effort}, {status['unconverged']} above the tolerance; {worst}")
+
+
+def _told_energy(energy: dict) -> str:
+    """Energies at both ends, and the loss; where something may give energy, the change and these sources instead."""
+    told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
+    if energy["dissipated"] is not None:
+        return f"{told}, {energy['dissipated']:.4f} J dissipated"
+    change = energy["end"] - energy["start"]
+    more = "gained" if change >= 0 else "lost"
+    return f"{told}, {abs(change):.4f} J {more}: work of {', '.join(energy['sources'])} less dissipation"
 
 
 def event_table(events: list[dict], names: list[str]) -> Table:

@@ -131,6 +131,7 @@ class SettingsReader:
     def __init__(self, scene: physics.Scene, file: SceneFile | None, given: SceneArguments):
         self._scene = scene
         table = file.others.get("environment", {}) if file is not None else {}
+        self._lacks_table = file.places if file is not None and "environment" not in file.others else None
         self._file = Section(table, "environment", file.places) if file is not None else Section({})
         self._given = Section({key: value for key, value in part(given, SceneArguments).items() if value is not None})
 
@@ -173,6 +174,11 @@ class SettingsReader:
             return section.read("driven", lambda value, key: body_indices(value, key, scene))
         if len(scene.bodies) == 1:
             return (0,)
+        if self._lacks_table is not None:
+            told = (
+                f"there is no table [environment]; allowed is one with driven, a list of bodies: {told_bodies(scene)}"
+            )
+            raise self._lacks_table.error(None, 0, None, told)
         raise section.error(None, f"driven is missing; allowed is a list of bodies: {told_bodies(scene)}")
 
     def _goal(self, driven: int, length: float) -> Goal | None:

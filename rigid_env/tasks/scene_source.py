@@ -12,7 +12,7 @@ from physics import scenes
 from physics.io.mjcf.files import load_mjcf
 from physics.io.scene_places import Places
 from physics.io.toml import SceneFile, file_from_content, load_file
-from physics.keywords import nearest_first
+from physics.keywords import alike, nearest_first
 from physics.summary import shown
 
 MJCF_FILES = (".xml", ".urdf")
@@ -70,7 +70,9 @@ def find_scene(scene: SceneSource | None) -> Found:
     if path.suffix.lower() in SCENE_FILES or path.is_file():
         if not path.is_file():
             what = "is a folder" if path.is_dir() else "does not exist"
-            raise ValueError(f"scene is {name!r}, which {what}; allowed is a scene file, or a canonical scene")
+            raise ValueError(
+                f"scene is {name!r}, which {what}; allowed is a scene file{_nearest(path)}, or a canonical scene"
+            )
         if path.suffix.lower() in MJCF_FILES:
             return Found(path.stem, load_mjcf(path), None)
         file = load_file(path)
@@ -78,3 +80,10 @@ def find_scene(scene: SceneSource | None) -> Found:
     if name in scenes.SCENES:
         return Found(name, scenes.by_name(name), None)
     raise ValueError(f"scene is {name!r}; allowed are {', '.join(nearest_first(name, scenes.SCENES))}, or {allowed}")
+
+
+def _nearest(path: Path) -> str:
+    """Words about the scene file in the same folder whose name is most like that of `path`; "" if none is alike."""
+    files = {each.name: each for each in path.parent.glob("*") if each.suffix.lower() in SCENE_FILES}
+    found = alike(path.name, files)
+    return f", such as {str(files[found[0]])!r}" if found else ""

@@ -123,6 +123,33 @@ def test_demo_tells_of_the_fall(tmp_path, monkeypatch, is_exhaustive):
         assert gif.n_frames == 26  # 25 a second, and the start
 
 
+def test_a_run_with_a_driven_body_claims_no_negative_dissipation(tmp_path):
+    """A belt drags a crate of 2 kg up to its speed: the crate gains ½ m v², and friction loses as much as heat."""
+    belt = physics.Motion(surface_velocity=(0.8, 0, 0))
+    bodies = [
+        physics.Block((4, 1, 2), fixed=True, pos=(0, -0.5, 0), motion=belt),
+        physics.Block((0.3, 0.3, 0.3), 2.0, pos=(0, 0.15, 0)),
+    ]
+    effects = [physics.Gravity(), physics.Contact(), physics.Friction(0.5)]
+    path, numbers = tmp_path / "belt.toml", tmp_path / "numbers.json"
+    physics.save_scene(physics.Scene(bodies, effects=effects), path)
+    output = run("run", path, "--duration", 0.5, "--json", numbers)
+    assert "0.6400 J gained: work of driven bodies less dissipation" in " ".join(output.split())
+    assert "J dissipated" not in output
+    energy = loaded(numbers)["energy"]
+    assert energy["dissipated"] is None
+    assert energy["sources"] == ["driven bodies"]
+    assert energy["end"] - energy["start"] == pytest.approx(0.5 * 2.0 * 0.8**2, abs=1e-6)
+
+
+def test_energy_may_come_from_pushes_and_wind_but_not_from_springs():
+    bodies = [physics.Sphere(0.5, 1.0, pos=(2.0 * k, 0, 0)) for k in range(2)]
+    effects = [physics.Spring(other=1), physics.Spring(damping=1.0), physics.Drag()]
+    assert demo.energy_sources(physics.Scene(bodies, effects=effects)) == []
+    effects += [physics.Push((1, 0, 0)), physics.Push((0, 1, 0)), physics.Wind()]
+    assert demo.energy_sources(physics.Scene(bodies, effects=effects)) == ["Push", "Wind"]
+
+
 def test_demo_far_from_the_walls_travels_with_the_block(tmp_path):
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("pygame")

@@ -57,7 +57,7 @@ MISTAKES = {
     ),
     "goal-tolerance": ("tolerance", "tolerance = 0", "environment.goal: tolerance is 0.0; allowed are"),
     "goal-speed": ("speed", "speed = nan", "environment.goal: speed is nan; allowed are"),
-    "start-key": ("pos", "velocity = [0, 0, 0]", "environment.start: velocity is not known; allowed are pos"),
+    "start-key": ("pos", "velocity = [0, 0, 0]", "environment.start: velocity is not known; allowed are linvel, pos"),
     "start-one": ("pos", "pos = 0.1", "environment.start: pos is 0.1; allowed is shape (3,)"),
     "start-negative": ("pos", "pos = [0, 0, -1]", "environment.start: pos is [ 0., 0., -1.]; allowed are"),
     "start-sunk": (
@@ -147,6 +147,21 @@ ARGUMENTS = {
     "of-file": ({"scene": CART, "driven": ["crat"]}, "driven holds 'crat'; allowed are crate, cart, or indices"),
     "effects": ({"scene": BALL, "effects": 3}, "effects is 3; allowed is a sequence of effects"),
 }
+
+
+def test_a_misspelt_file_is_told_with_the_nearest_in_its_folder(tmp_path):
+    physics.save_scene(BALL, tmp_path / "small.toml")
+    with pytest.raises(ValueError, match=r"smal.toml', which does not exist; .* file, such as '.*small.toml', or"):
+        SceneEnv(tmp_path / "smal.toml")
+
+
+def test_a_file_without_a_table_of_the_environment_says_so(tmp_path):
+    bodies = [physics.Sphere(0.5, 1.0, pos=(2 * k, 0, 0), name=name) for k, name in enumerate(("cart", "crate"))]
+    physics.save_scene(physics.Scene(bodies), tmp_path / "two.toml")
+    told = r"two.toml, line 1: there is no table \[environment\]; allowed is one with driven, .*: cart, crate, or"
+    with pytest.raises(ValueError, match=told):
+        SceneEnv(tmp_path / "two.toml")
+    assert SceneEnv(tmp_path / "two.toml", driven="cart").task is not None
 
 
 @pytest.mark.parametrize("name", ARGUMENTS)

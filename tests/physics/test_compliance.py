@@ -295,7 +295,7 @@ def test_it_comes_back_from_a_file(tmp_path):
     scene = physics.Scene([ball()], [FLOOR], [physics.Contact(stiffness=1e4, damping=3.0)])
     physics.save_scene(scene, tmp_path / "scene.toml")
     assert physics.load_scene(tmp_path / "scene.toml") == scene
-    with pytest.raises(ValueError, match=r"cannot express Contact\(.*stiffness=10000.0"):
+    with pytest.raises(ValueError, match=r"cannot express Contact.stiffness of 10000.0"):
         physics.save_mjcf(scene, tmp_path / "scene.xml")
 
 

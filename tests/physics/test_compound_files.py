@@ -43,10 +43,10 @@ def test_a_scene_file_gives_an_equal_scene():
 @pytest.mark.parametrize(
     ("parts", "told"),
     [
-        ("parts = 3", "line 3: bodies[0]: parts is 3; allowed is a list of Block"),
+        ("parts = 3", "line 3: bodies[0]: Compound.parts is 3; allowed is a list of Block"),
         ('parts = [{kind = "Blok"}]', "line 3: bodies[0]: parts[0]: kind is 'Blok'; allowed are Block, "),
-        ('[[bodies.parts]]\nkind = "Block"\nsize = [1, 2]', "bodies[0]: parts[0]: size has shape (2,)"),
-        ('[[bodies.parts]]\nkind = "Sphere"\nradius = 1\nmass = 1\nname = "x"', "bodies[0]: parts[0].name is 'x'"),
+        ('[[bodies.parts]]\nkind = "Block"\nsize = [1, 2]', "bodies[0]: parts[0]: Block.size has shape (2,)"),
+        ('[[bodies.parts]]\nkind = "Sphere"\nradius = 1\nmass = 1\nname = "x"', "Compound.parts[0].name is 'x'"),
     ],
 )
 def test_an_error_names_the_part(parts, told):

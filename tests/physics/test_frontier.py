@@ -195,6 +195,13 @@ def test_energy_is_conserved_or_never_rises():
         assert found == pytest.approx(error, nan_ok=True)
 
 
+def test_a_driven_body_may_add_energy():
+    belt = physics.Block((4, 1, 2), fixed=True, motion=physics.Motion(surface_velocity=(1, 0, 0)))
+    crate = physics.Block((1, 1, 1), 1.0, pos=(0, 1, 0))
+    scene = physics.Scene([belt, crate], effects=[physics.Contact(), physics.Friction(0.5)])
+    assert math.isnan(frontier_errors.energy_error(scene, np.array([[0.0, 0.0], [0.0, 0.5]])))
+
+
 def test_events_are_paired_where_both_have_as_many():
     def event(t, kind):
         return SimpleNamespace(t=t, kind=kind)
@@ -241,6 +248,32 @@ def test_cheapest_is_the_quickest_that_is_shown_to_be_good_enough():
     assert "truth itself is known to 1e-07" in found.advice(1e-8)
     assert found.advice(1e-4) == "below 0.0001 m: a at 5 ms, error 1e-05, 2000000 µs per s"
     assert "the best is b at 10 ms, error 1e-06" in found.advice(5e-7)
+
+
+# A crate dropped on a ramp at `balanced`, as measured: at 10 ms its last bounce ends by luck where the truth has it.
+LUCKY = [(0.02, 7.4e-3), (0.01, 1.3e-7), (0.005, 4.8e-4), (0.002, 4.6e-4), (0.001, 3e-7)]
+
+
+def test_a_step_is_advised_only_if_all_finer_steps_of_its_setting_are_good_too():
+    found = made([point("balanced", dt, error, 1e-3 / dt) for dt, error in LUCKY])
+    assert found.cheapest(1e-4).dt == 0.001
+    assert found.cheapest(1e-3).dt == 0.01
+    told = found.advice(1e-4)
+    assert told.startswith("below 0.0001 m: balanced at 1 ms, error 3e-07")
+    assert told.endswith("; not balanced at 10 ms, error 1.3e-07 by luck: the finer step of 5 ms has 0.00048")
+    assert found.advice(1e-3) == "below 0.001 m: balanced at 10 ms, error 1.3e-07, 100000 µs per s"
+
+
+def test_a_lucky_step_is_named_where_no_step_can_be_advised():
+    found = made([point("balanced", dt, error, 1e-3 / dt) for dt, error in LUCKY[:-1]])
+    assert found.cheapest(1e-4) is None
+    assert "no setting that was measured at all its finer steps; not balanced at 10 ms" in found.advice(1e-4)
+
+
+def test_a_finer_step_that_is_lost_is_not_good():
+    found = made([point("a", 0.01, 1e-6, 1.0), point("a", 0.005, 1e-6, 2.0, is_lost=True), point("b", 0.01, 1e-5, 9.0)])
+    assert found.cheapest(1e-4).setting == "b"
+    assert "the finer step of 5 ms is lost" in found.advice(1e-4)
 
 
 def test_cheapest_takes_nothing_that_is_lost_and_says_when_all_are():

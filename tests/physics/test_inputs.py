@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -176,3 +177,42 @@ def test_numbers_of_every_real_kind_are_taken():
     assert physics.Contact(between_bodies=np.True_).between_bodies is True
     accuracy = physics.Accuracy(substeps=np.int64(3), tolerance=np.float32(0.5))
     assert (type(accuracy.substeps), type(accuracy.tolerance)) == (int, float)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: physics.Block((1, 1, 1), -1, name="crate"), "Block.mass of 'crate' is -1.0; allowed are numbers"),
+        (lambda: physics.Block((1, 1), 1), "Block.size has shape (2,); allowed is shape (3,); given: [1.0, 1.0]"),
+        (lambda: physics.Sphere(0, 1), "Sphere.radius is 0.0; allowed are numbers greater than 0"),
+        (lambda: physics.Capsule(0.1, 1, 1, quat=(0, 0, 0, 0)), "Capsule.quat is "),
+        (lambda: physics.Sphere(1, 1, name=" "), "Sphere.name is ' '; allowed are printable"),
+        (lambda: physics.Compound([1], name="chair"), "Compound.parts[0] of 'chair' is 1; allowed are instances"),
+        (
+            lambda: physics.Gravity(9.81),
+            "Gravity.acceleration is 9.81; allowed is a vector of shape (3,), such as (0, -9.81, 0) if y",
+        ),
+        (
+            lambda: physics.Gravity((0, 1)),
+            "Gravity.acceleration has shape (2,); allowed is shape (3,); given: [0.0, 1.0]",
+        ),
+        (
+            lambda: make(2, 1).set_state(pos=(1, 2)),
+            "pos has shape (2,); allowed is shape (2, 3) or (1, 2, 3); given: [1.0, 2.0]",
+        ),
+        (
+            lambda: make(2, 1).set_state(pos=np.zeros((9, 9))),
+            "pos has shape (9, 9); allowed is shape (2, 3) or (1, 2, 3)",
+        ),
+    ],
+)
+def test_a_wrong_value_is_told_with_its_owner_and_what_was_given(make, message):
+    with pytest.raises(ValueError, match=f"^{re.escape(message)}") as told:
+        make()
+    assert ("given" in str(told.value)) == ("given" in message)
+
+
+@pytest.mark.parametrize("load", [physics.load_scene, physics.load_mjcf])
+def test_a_folder_is_no_file(load, tmp_path):
+    with pytest.raises(IsADirectoryError, match=r"path is '.*', which is a folder; allowed is a .*file"):
+        load(tmp_path)

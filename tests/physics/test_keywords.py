@@ -63,6 +63,26 @@ def test_a_misspelt_keyword_is_told_with_the_nearest_first(call, message):
     assert str(told.value).startswith(message)
 
 
+@pytest.mark.parametrize(
+    ("name", "first"),
+    [("position", "pos"), ("velocity", "linvel"), ("angular_velocity", "angvel"), ("Static", "fixed")],
+)
+def test_a_name_of_other_engines_is_told_with_ours_first(name, first):
+    with pytest.raises(TypeError, match=rf"Block got an unexpected .* '{name}' .*; allowed are {first}, "):
+        physics.Block((1, 1, 1), 1.0, **{name: (0, 1, 0)})
+
+
+def test_an_argument_given_twice_is_told_with_both_values_and_the_order():
+    with pytest.raises(TypeError) as told:
+        physics.Spring("crate", anchor=(0, 3, 0))
+    assert str(told.value) == (
+        "Spring got multiple values for argument 'anchor': 'crate' without a name, and anchor=(0, 3, 0); allowed is "
+        "one: without names they are, in order, anchor, point, stiffness, damping, length, body, other"
+    )
+    with pytest.raises(TypeError, match="throw got multiple values for argument 'ball': 1 without a name, and ball=2"):
+        throw(1, ball=2)
+
+
 def test_a_long_value_is_told_in_short():
     with pytest.raises(TypeError) as told:
         Ball(1.0, poss=list(range(100_000)))
@@ -93,7 +113,13 @@ def test_what_takes_every_keyword_is_refused():
 
 @pytest.mark.parametrize(
     ("module", "name", "first"),
-    [(physics, "Wrold", "World"), (physics.scenes, "dorp", "drop"), (physics.scenes, "by_nam", "by_name")],
+    [
+        (physics, "Box", "Block"),
+        (physics, "Ball", "Sphere"),
+        (physics, "Wrold", "World"),
+        (physics.scenes, "dorp", "drop"),
+        (physics.scenes, "by_nam", "by_name"),
+    ],
 )
 def test_a_misspelt_name_of_a_module_is_told_with_the_nearest_first(module, name, first):
     with pytest.raises(

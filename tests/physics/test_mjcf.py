@@ -229,19 +229,38 @@ def test_names_come_back_and_none_is_given_twice(reader):
 def test_what_mjcf_cannot_express_is_refused_or_named(tmp_path, reader):
     scene = physics.Scene([physics.Sphere(1, 1)], effects=[physics.Gravity(), physics.Drag(0.3), physics.Contact(0.5)])
     path = tmp_path / "scene.xml"
-    with pytest.raises(ValueError, match=r"cannot express Contact\(restitution=0.5.*\), Drag\(.*drop=True"):
+    with pytest.raises(ValueError, match=r"cannot express Contact.restitution of 0.5, Drag; .*drop=True"):
         physics.save_mjcf(scene, path)
     assert not path.exists()
     physics.save_mjcf(scene, path, drop=True)
-    assert re.search(r"left out: Contact\(restitution=0.5, .*\), Drag\(coefficient=0.3", path.read_text())
+    assert "left out: Contact.restitution of 0.5, Drag -->" in path.read_text()
     assert physics.load_mjcf(path).effects == (physics.Gravity(),)
+
+
+def test_a_motion_is_left_out_and_its_body_stands_still(tmp_path, reader):
+    belt = physics.Block((4, 1, 2), fixed=True, name="belt", motion=physics.Motion(surface_velocity=(0.8, 0, 0)))
+    bouncy = physics.Sphere(0.5, 1.0, pos=(0, 1, 0), restitution=0.5)
+    pushes = [physics.Push((1, 0, 0), body=1), physics.Push((0, 1, 0), body=1)]
+    sensors = [physics.Sensor(physics.Sphere(0.5, fixed=True), name="gate")]
+    scene = physics.Scene([belt, bouncy], effects=[physics.Contact(), *pushes], sensors=sensors)
+    named = (
+        "Block.motion of bodies[0] 'belt' (it stands still in MJCF), Sphere.restitution of bodies[1], 2 Push, "
+        "sensors[0] 'gate'"
+    )
+    path = tmp_path / "belt.xml"
+    with pytest.raises(ValueError, match=re.escape(f"MJCF cannot express {named}; pass drop=True")):
+        physics.save_mjcf(scene, path)
+    physics.save_mjcf(scene, path, drop=True)
+    assert f"left out: {named} -->" in path.read_text()
+    bodies = physics.load_mjcf(path).bodies
+    assert [(body.fixed, body.motion) for body in bodies] == [(True, None), (False, None)]
 
 
 def test_two_coefficients_of_friction_are_left_out_whole(tmp_path, reader):
     """A geom of MuJoCo has one along the surface: none is better than half of it."""
     grain = physics.Friction((0.2, 0.5), axis=(0, 0, 1))
     scene = physics.Scene([physics.Sphere(1, 1)], [physics.HalfSpace((0, 1, 0), -5)], [physics.Contact(), grain])
-    with pytest.raises(ValueError, match=r"cannot express Friction\(coefficient=\(0.2, 0.5\)"):
+    with pytest.raises(ValueError, match=r"cannot express Friction of two coefficients \(0.2, 0.5\)"):
         physics.save_mjcf(scene, tmp_path / "scene.xml")
     physics.save_mjcf(scene, tmp_path / "scene.xml", drop=True)
     assert physics.load_mjcf(tmp_path / "scene.xml").effect(physics.Friction) is None

@@ -108,6 +108,26 @@ def test_walls_are_reached_by_the_lowest_point():
     assert found.other_point[0, 2] == pytest.approx((9, 0.5, 0), abs=EXACT)
 
 
+def test_bodies_and_walls_are_named_or_numbered():
+    balls = [physics.Sphere(0.5, 1.0, pos=(3.0 * k, 1.0, 0), name=name) for k, name in enumerate(("red", "blue"))]
+    floor = physics.HalfSpace((0, 1, 0), name="floor")
+    world = physics.World(physics.Scene(balls, [floor], [physics.Contact()]))
+    named = world.measure_distances(["red", "blue", 1], ["blue", "floor", -1])
+    assert named.gap.tolist() == world.measure_distances([0, 1, 1], [1, -1, -1]).gap.tolist()
+    assert world.measure_distances("red", "blue").gap.tolist() == [[2.0]]
+    assert world.nearest_to(None, (0, 1, 0), exclude="red").other.tolist() == [[-1]]
+    rays = {"origins": (0, 0, 0), "directions": (1, 0, 0)}
+    assert world.cast_rays(**rays, carrier="red").distance.tolist() == [[2.5]]
+    assert world.cast_rays(**rays, carrier="red", exclude="blue").hit.tolist() == (
+        world.cast_rays(**rays, carrier=0, exclude=1).hit.tolist()
+    )
+    assert world.read_contacts(body="red").count.tolist() == [0]
+    with pytest.raises(ValueError, match="carrier is 'rad'; allowed are red, blue, or indices from 0 to 1"):
+        world.cast_rays(**rays, carrier="rad")
+    with pytest.raises(ValueError, match="second holds the end 'flor'; allowed are floor, red, blue, indices from -1"):
+        world.measure_distances("red", "flor")
+
+
 def test_a_point_and_a_shape_find_the_nearest_of_all():
     world = world_of(
         CUBE, at(CUBE, (6, 0, 0)), physics.Sphere(1.0, 1.0, pos=(0, 6, 0)), walls=[physics.HalfSpace((0, 1, 0), -3.0)]
@@ -283,8 +303,8 @@ def test_many_different_shapes_are_compared_and_not_all_kept(rng):
         ({"second": [1, -2]}, r"second is \[1, -2\]; allowed are indices from 0 to 1, and from -1 to -1 for walls"),
         ({"second": 0}, "first and second are both 0; allowed are different bodies"),
         ({"first": [0, 0], "second": [1, 1, 1]}, "first has 2 bodies and second has 3; allowed are as many, or one"),
-        ({"first": 0.5}, "first is 0.5; allowed is an index or a list of them"),
-        ({"first": [[0], [0, 1]]}, "first is .*; allowed is an index or a list of them"),
+        ({"first": 0.5}, "first is 0.5; allowed is an index or a name, or a list of them"),
+        ({"first": [[0], [0, 1]]}, "first is .*; allowed is an index or a name, or a list of them"),
         ({"worlds": [1]}, r"worlds is \[1\]; allowed are indices from 0 to 0"),
         ({"out": 1}, "out is 1; allowed is None or Nearest of an earlier call"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 
 import numpy as np
@@ -62,3 +63,41 @@ def test_a_tensor_of_a_copy_leaves_the_world_alone(world, torch, name):
         np.testing.assert_array_equal(tensor.numpy(), before)
         tensor.add_(1.0)
         np.testing.assert_array_equal(view, before)
+
+
+@pytest.mark.parametrize(
+    ("name", "advice"),
+    [
+        ("pos", "set_state(pos="),
+        ("quat", "set_state(quat="),
+        ("linvel", "set_state(linvel="),
+        ("angvel", "set_state(angvel="),
+        ("state", "set_state(pos="),
+        ("gravity", "set_parameters(gravity="),
+        ("params", "set_parameters(mass="),
+        ("walls", "set_parameters(wall_friction="),
+        ("mass", "set_parameters(mass="),
+        ("friction", "set_parameters(friction="),
+        ("dt", "step(dt="),
+        ("worlds", "World(worlds="),
+        ("scene", "World(scene="),
+        ("memory", "restore"),
+        ("names", "World(scene)"),
+    ],
+)
+def test_an_attribute_is_not_set_and_the_error_names_the_method(world, name, advice):
+    before = vars(world).get(name)
+    with pytest.raises(AttributeError) as error:
+        setattr(world, name, 5.0)
+    assert str(error.value).startswith(f"World.{name} is ")
+    assert advice in str(error.value)
+    assert vars(world).get(name) is before
+
+
+def test_a_copy_of_a_world_refuses_assignments_too(world):
+    twin = copy.deepcopy(world)
+    with pytest.raises(AttributeError, match="set_state"):
+        twin.linvel = 5.0
+    twin.set_state(linvel=(5.0, 0.0, 0.0))
+    assert twin.linvel.tolist() == [[[5.0, 0.0, 0.0]]]
+    assert not hasattr(twin, "mass")

@@ -233,7 +233,35 @@ def test_batches_and_parameters_per_world():
         batch.set_parameters(effects=[physics.Spring()])
 
 
+def named(*effects):
+    pair = [physics.Sphere(0.1, 1.0, name="crate"), physics.Sphere(0.1, 1.0, pos=(2, 0, 0), name="ball")]
+    return physics.Scene(pair, effects=effects)
+
+
+def test_springs_and_pushes_name_their_bodies(tmp_path):
+    """A scene replaces names by indices, so that it equals the scene with indices, in files and texts, too."""
+    by_name = named(physics.Spring(body="ball", other="crate"), physics.Push((1, 0, 0), body="ball"))
+    by_index = named(physics.Spring(body=1, other=0), physics.Push((1, 0, 0), body=1))
+    assert by_name == by_index
+    assert repr(by_name) == repr(by_index)
+    physics.save_scene(by_name, tmp_path / "pair.toml")
+    text = (tmp_path / "pair.toml").read_text()
+    assert physics.load_scene(tmp_path / "pair.toml") == by_name
+    (tmp_path / "pair.toml").write_text(text.replace("body = 1", 'body = "ball"'))
+    assert '"ball"\n' in (tmp_path / "pair.toml").read_text()
+    assert physics.load_scene(tmp_path / "pair.toml") == by_name
+    world = physics.World(by_name)
+    world.set_parameters(effects=[physics.Push((0, 3, 0), body="ball")])
+    world.step()
+    assert world.linvel[0, 1, 1] > 0.0
+    assert world.linvel[0, 0, 1] == 0.0
+
+
 BAD = [
+    (lambda: named(physics.Push(body="bal")), "Push.body is 'bal'; allowed are ball, crate, or indices from 0 to 1"),
+    (lambda: named(physics.Spring(other="bal")), "Spring.other is 'bal'; allowed are ball, crate, or indices"),
+    (lambda: named(physics.Spring(body="ball", other=1)), "Spring.other is 1, as Spring.body"),
+    (lambda: physics.Spring(body="a", other="a"), "Spring.other is 'a', as Spring.body"),
     (lambda: physics.Spring(other=0), "Spring.other is 0, as Spring.body; allowed are other bodies and None"),
     (lambda: physics.Spring(other=-1), "Spring.other is -1"),
     (lambda: physics.Scene([physics.Sphere(1, 1)], effects=[physics.Spring(other=1)]), "Spring.other is 1; .* below 1"),

@@ -120,7 +120,7 @@ FILES = rows(
     ("mjcf-contype", lambda: loaded(BALL_MJCF.format("contype='x'"), p.load_mjcf), ("line 1: ", "contype", "is 'x'")),
     ("mjcf-size", lambda: loaded(BALL_MJCF.format("type='box'"), p.load_mjcf), ("line 1: ", "size")),
     ("mjcf-save-none", lambda: p.save_mjcf(None, "x.xml"), ("scene is None", "a physics.Scene")),
-    ("mjcf-save-drag", lambda: p.save_mjcf(scene(p.Drag()), "x.xml"), ("cannot express Drag(", "drop=True")),
+    ("mjcf-save-drag", lambda: p.save_mjcf(scene(p.Drag()), "x.xml"), ("cannot express Drag;", "drop=True")),
 )
 
 FRONTIERS = rows(

@@ -29,13 +29,13 @@ def save_mjcf(scene: Scene, path: str | Path, drop: bool = False) -> None:
     path : str or Path
         Path of the file.
     drop : bool
-        Whether to leave out effects that MJCF cannot express, instead of refusing the scene. A comment in the file
-        names them.
+        Whether to leave out effects, fields and sensors that MJCF cannot express, instead of refusing the scene. A
+        comment in the file names them. A body with a motion is written, and stands still.
 
     Raises
     ------
     ValueError
-        The scene has effects that MJCF cannot express, and `drop` is False. The message names them.
+        The scene has something that MJCF cannot express, and `drop` is False. The message names it.
     """
     validation.instance(scene, Scene, "scene", "a physics.Scene")
     validation.path(path)
@@ -80,6 +80,9 @@ def load_mjcf(path: str | Path, drop: bool = False) -> Scene | tuple[Scene, list
     validation.path(path)
     try:
         text = Path(path).read_text(encoding="utf-8")
+    except IsADirectoryError as error:
+        told = f"path is {str(path)!r}, which is a folder; allowed is a file in MJCF (.xml)"
+        raise IsADirectoryError(error.errno, told) from None
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: byte {error.start} is no UTF-8; allowed is a text file in MJCF") from None
     scene, left = read_mjcf(text, str(path), drop, Path(path))

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from physics.io.mjcf.capsule_frames import OF_GEOM, WITH_AXIS
+from physics.io.mjcf.inexpressible import inexpressible
 from physics.io.mjcf.surfaces import Frictions
 from physics.rotations import product as quaternion_product
 from physics.rotations import rotation_matrices
 from physics.scene.bodies import Body
 from physics.scene.compound import Compound, PlacedPart
-from physics.scene.effects import Contact, Friction, Gravity
+from physics.scene.effects import Contact, Gravity
 from physics.scene.force_fields import Spring
 from physics.scene.groups import assign_groups, touching_pairs
 from physics.scene.scene import Scene
@@ -67,12 +68,12 @@ def geom_names(b: int, body: Body) -> list[str]:
 
 def to_mjcf(scene: Scene, drop: bool = False) -> str:
     """Make the MJCF text of a scene; see `save_mjcf` for its contents and for `drop`."""
-    lost = _inexpressible(scene)
+    lost = inexpressible(scene)
     if lost and not drop:
-        raise ValueError(f"MJCF cannot express {', '.join(map(repr, lost))}; pass drop=True to leave that out")
+        raise ValueError(f"MJCF cannot express {', '.join(lost)}; pass drop=True to leave that out")
     root = ET.Element("mujoco", model="scene")
     if lost:
-        root.append(ET.Comment(f" left out: {', '.join(map(repr, lost))} ".replace("--", "- -")))
+        root.append(ET.Comment(f" left out: {', '.join(lost)} ".replace("--", "- -")))
     ET.SubElement(root, "compiler", angle="radian")
     gravity = scene.effect(Gravity)
     ET.SubElement(root, "option", gravity=_text(gravity.acceleration if gravity else (0, 0, 0)))
@@ -141,17 +142,6 @@ def _add_meshes(root: ET.Element, scene: Scene) -> None:
 def _numbered_parts(body: Body) -> list[tuple[str, Body]]:
     """Parts of a compound, each with the end of its name in MJCF; of another body the body alone."""
     return [(f".{k}", part) for k, part in enumerate(body.parts)] if isinstance(body, Compound) else [("", body)]
-
-
-def _inexpressible(scene: Scene) -> list:
-    contact = scene.effect(Contact)
-    rebounds = contact and (contact.restitution or any(mu for _, _, mu in contact.restitution_pairs))
-    lost: list[Any] = [contact] if contact and (rebounds or contact.tangential or contact.stiffness) else []
-    lost += [item for item in (*scene.bodies, *scene.walls) if item.restitution or getattr(item, "motion", None)]
-    friction = scene.effect(Friction)
-    lost += [friction] if friction and friction.axis is not None else []
-    lost += scene.sensors
-    return lost + [e for e in scene.effects if not isinstance(e, (Gravity, Contact, Friction, Spring))]
 
 
 def _text(numbers) -> str:
