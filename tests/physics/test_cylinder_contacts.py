@@ -100,7 +100,7 @@ def test_a_cylinder_rolls_off_the_end_of_a_table_precisely():
 
 
 def on_roller(kind: str, preset: str, dt: float, time: float = 0.2) -> float:
-    """Error of the place of a cylinder that rolls from rest at 0.3 rad on the top of a fixed cylinder or capsule [m]."""
+    """Error of the place of a cylinder that rolls from rest at 0.3 rad on top of a fixed cylinder or capsule [m]."""
     R, r, lean = 0.3, 0.1, 0.3
     rest = {"fixed": True, "quat": ALONG_Z}
     roller = physics.Cylinder(R, 0.4, **rest) if kind == "cylinder" else physics.Capsule(R, 1.0, **rest)
