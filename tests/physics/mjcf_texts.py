@@ -133,7 +133,6 @@ READ = {
         box(), world='<body euler="30 0 0" pos="0 0 -1">' + floor('zaxis="1 0 2"') + "</body>"
     ),
     "cylinder": model('<geom type="cylinder" size=".1 .2" pos="0 0 0" euler="0 30 0"/>', world=floor()),
-    "fixed cylinder": model(box(), world=floor() + '<geom type="cylinder" size=".1 .2" euler="90 0 20"/>'),
     "seen only": model(
         box() + '<geom type="capsule" size=".1 .2" mass="0" contype="0" conaffinity="0"/>',
         world=floor() + '<geom type="cylinder" size=".1 .2" contype="0" conaffinity="0"/>',
