@@ -191,15 +191,18 @@ def test_no_stiffness_gives_energy_to_a_heap(k):
     A solve leaves 1e-6, and up to 1e-3 where it does not converge.
     """
     rng, worlds = np.random.default_rng(3), 50
-    makes = [physics.Block((1, 0.6, 0.4), M), physics.Sphere(0.3, M), physics.Block((1, 0.6, 0.4), M)]
+    block = {"size": (1, 0.6, 0.4), "mass": M}
+    bodies = [
+        physics.Block(**block, pos=(0, 0.7, 0)),
+        physics.Sphere(0.3, M, pos=(0, 2.0, 0)),
+        physics.Block(**block, pos=(0, 3.3, 0)),
+    ]
     effects = soft(k, 0.0, physics.Gravity(), physics.Friction(0.5))
-    world = physics.World(physics.Scene(makes, [FLOOR], effects), worlds=worlds, dt=0.01)
-    pos = np.zeros((worlds, 3, 3))
-    pos[:, :, 1] = 0.7, 2.0, 3.3
+    world = physics.World(physics.Scene(bodies, [FLOOR], effects), worlds=worlds, dt=0.01)
     quat = rng.normal(size=(worlds, 3, 4))
     quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
     turn = 3 * rng.normal(size=(worlds, 3, 3))
-    world.set_state(pos=pos, quat=quat, linvel=rng.normal(size=(worlds, 3, 3)), angvel=turn)
+    world.set_state(quat=quat, linvel=rng.normal(size=(worlds, 3, 3)), angvel=turn)
     start = motion_energy(world)
     for _ in range(200):
         world.step()
