@@ -78,9 +78,7 @@ class ManyBodies(Scheme):
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        found = objections.to_cylinders(scene, needs)
-        if self.is_error_controlled:
-            found = found or objections.to_laws_of_stages(needs)
+        found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
         found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 

@@ -13,9 +13,7 @@ from physics.kernels.state.contact_law_dispatch import (
     LAW_TANGENTIAL,
 )
 from physics.scene.body_axes import axis_table
-from physics.scene.groups import potential_pairs, touching_pairs
 from physics.scene.needs import Needs
-from physics.scene.parts import with_parts
 from physics.scene.scene import Scene
 
 DECLARED = {
@@ -85,23 +83,4 @@ def to_turns(needs: Needs, accuracy: Accuracy) -> str:
             f"Accuracy.collisions is 'sequential' with scheme {accuracy.scheme!r}; allowed where bodies touch walls "
             "only is the scheme 'events', which knows the moment of a collision"
         )
-    return ""
-
-
-def to_cylinders(scene: Scene, needs: Needs) -> str:
-    """Message against torques of rolling or spin friction on a cylinder that may touch another body than a sphere."""
-    laws = {LAW_ROLLING, LAW_SPIN} & set(needs.laws)
-    if not (laws and needs.meeting and needs.cylinders):
-        return ""
-    between = needs.contact.between_bodies
-    pairs = touching_pairs(scene, between)
-    pairs = potential_pairs(scene, between) if pairs is None else pairs
-    kinds = [{part.kind for part in with_parts([body])} - {"compound"} for body in scene.bodies]
-    for b, other in zip(*np.nonzero(pairs[:, : len(kinds)])):
-        if "cylinder" in kinds[b] and kinds[other] != {"sphere"}:
-            return (
-                f"Scene.effects holds {DECLARED[LAW_ROLLING if LAW_ROLLING in laws else LAW_SPIN]}, but "
-                f"Scene.bodies[{b}] is or holds a cylinder, which may touch bodies[{other}]; cylinders have it at "
-                "walls and spheres: allowed are groups that keep both apart, and spheres, ellipsoids and capsules"
-            )
     return ""

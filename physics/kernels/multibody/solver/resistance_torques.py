@@ -62,24 +62,30 @@ def _is_round(part, many):
     return shape == at.SPHERE or shape == at.ELLIPSOID or shape == at.CAPSULE
 
 
+@inlined
+def _is_round_at(k, b, many):
+    """True if one of the parts at contact k has no faces; `b` is the second end as of `fixed_bodies.body_at`."""
+    return _is_round(first_part(k, many), many) or (b >= 0 and _is_round(second_part(b, k, many), many))
+
+
 @if_given("many.bodies.cylinders", False)
 def _is_on_face(k, many):
-    """True if contact k is one of a cylinder's face on a wall: the face spins there, but does not roll."""
-    is_at_wall = body_at(many.contacts.bodies[k, 1], many) < 0
-    return is_at_wall and is_cylinder(first_part(k, many), many) and not may_roll(k, many)
+    """True if contact k is one of a cylinder that does not roll there, such as on its face: it may only spin."""
+    b = body_at(many.contacts.bodies[k, 1], many)
+    has_cylinder = is_cylinder(first_part(k, many), many) or (b >= 0 and is_cylinder(second_part(b, k, many), many))
+    return has_cylinder and not may_roll(k, many) and not _is_round_at(k, b, many)
 
 
 @inlined
 def _resists(k, many):
     """True if a body at contact k is round there, and the contact is not between bodies that pass each other.
 
-    A cylinder is round on a wall, on its rims and its side, and may spin there on a face.
+    A cylinder is round where its rims or its side roll, and may spin on a face.
     """
     if many.contacts.owner[k] == PARTED:
         return False
     b = body_at(many.contacts.bodies[k, 1], many)
-    is_round = _is_round(first_part(k, many), many) or (b >= 0 and _is_round(second_part(b, k, many), many))
-    return is_round or may_roll(k, many) or _is_on_face(k, many)
+    return _is_round_at(k, b, many) or may_roll(k, many) or _is_on_face(k, many)
 
 
 @inlined
