@@ -239,7 +239,8 @@ def add_on_face(pair, face, limits, h, many):
         if end == lower:
             found, is_flat = add_flat_end(pair, face, end, limits, h, many)
         if is_flat:
-            found = min(found, add_outline(pair, face, end, limits, h, many))
+            if abs(qt.dot(n, axis_of(R))) >= FLAT_COSINE:  # else the end's normal is no way out
+                found = min(found, add_outline(pair, face, end, limits, h, many))
         else:
             found = _add_point(pair, end, face, one if end == 0 else two, limits, h, many)
         low = min(low, found)
