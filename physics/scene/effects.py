@@ -47,7 +47,7 @@ class Gravity(Effect):
         given: Any = self.acceleration
         if isinstance(given, (int, float)) and not isinstance(given, bool) and abs(given) < 1e300:
             down = f"(0, {-abs(given):g}, 0) if y points up"
-            raise ValueError(f"Gravity.acceleration is {given!r}; allowed is a vector of shape (3,), such as {down}")
+            raise ValueError(f"Gravity.acceleration is {given!r}; allowed is shape (3,), such as {down}")
         value = validation.finite(self.acceleration, (3,), "Gravity.acceleration")
         object.__setattr__(self, "acceleration", tuple(value.tolist()))
 

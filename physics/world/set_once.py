@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
+
+Kind = TypeVar("Kind", bound=type)
 
 _STATE = "read-only; use set_state({}=...)"
 _PARAMETER = "read-only; use set_parameters({}=...)"
@@ -56,7 +58,7 @@ class Absent:
         raise AttributeError(f"{type(world).__name__}.{self.name} is {self.advice}")
 
 
-def with_attributes_set_once(kind: Any) -> Any:
+def with_attributes_set_once(kind: Kind) -> Kind:
     """Decorate the class `World`: its attributes in `ADVICE` are set once, and names in `ABSENT` are never set."""
     for names, descriptor in ((ADVICE, SetOnce), (ABSENT, Absent)):
         for name, advice in names.items():

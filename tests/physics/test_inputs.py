@@ -190,7 +190,7 @@ def test_numbers_of_every_real_kind_are_taken():
         (lambda: physics.Compound([1], name="chair"), "Compound.parts[0] of 'chair' is 1; allowed are instances"),
         (
             lambda: physics.Gravity(9.81),
-            "Gravity.acceleration is 9.81; allowed is a vector of shape (3,), such as (0, -9.81, 0) if y",
+            "Gravity.acceleration is 9.81; allowed is shape (3,), such as (0, -9.81, 0) if y",
         ),
         (
             lambda: physics.Gravity((0, 1)),
