@@ -32,7 +32,8 @@ def test_every_environment_has_every_algorithm():
     with_rewards = {(f"rigid_env/{name}-v0", algo) for name in ("BlockReach", "BlockReorient") for algo in ALGORITHMS}
     of_suite = {(f"rigid_env/{name}-v0", "ppo") for name in SUITE}
     # hindsight needs a replay buffer
-    assert set(ENTRIES) == with_rewards | of_suite | {("rigid_env/BlockReachGoal-v0", "sac")}
+    with_goals = {("rigid_env/BlockReachGoal-v0", "sac"), ("rigid_env/BlockReorientGoal-v0", "ppo")}
+    assert set(ENTRIES) == with_rewards | of_suite | with_goals
 
 
 @pytest.mark.parametrize(("env", "algo"), ENTRIES)
