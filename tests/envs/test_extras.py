@@ -147,6 +147,7 @@ def test_the_extras_are_those_of_the_metadata():
         "torch": "stable-baselines3",
         "pandas": "ray",  # as ray[tune]
         "pyarrow": "ray",
+        "jax": "minari",  # as minari[create]
     }
 
     def all_of(extra):

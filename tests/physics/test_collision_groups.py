@@ -168,7 +168,7 @@ def test_files_and_reprs_hold_what_was_given():
     assert eval(repr(GHOST), vars(physics)) == GHOST
     assert repr(FLOOR) == "HalfSpace(normal=(0.0, 1.0, 0.0), offset=0.0, group=3)"
     assert "group" not in repr(BOX)
-    with pytest.raises(ValueError, match=r"scene, line \d+: bodies\[1\]: mask is -2; allowed are whole numbers"):
+    with pytest.raises(ValueError, match=r"scene, line \d+: bodies\[1\]: Sphere.mask is -2; allowed are whole numbers"):
         from_toml(text.replace("mask = 2", "mask = -2"))
 
 
@@ -184,7 +184,7 @@ def test_a_snapshot_does_not_fit_into_other_groups():
 @pytest.mark.parametrize("name", ["group", "mask"])
 def test_what_is_no_set_of_bits_is_refused(name, value):
     allowed = "allowed are whole numbers from 0 to 4294967295"
-    with pytest.raises(ValueError, match=rf"^{name} is .*; {allowed}"):
+    with pytest.raises(ValueError, match=rf"^Sphere.{name} is .*; {allowed}"):
         Sphere(1, 1, **{name: value})
     with pytest.raises(ValueError, match=rf"^HalfSpace.{name} is .*; {allowed}"):
         HalfSpace((0, 1, 0), **{name: value})

@@ -309,7 +309,7 @@ def test_gaps_to_walls_are_those_of_its_corners():
 def test_a_scene_of_hulls_comes_back_from_a_file():
     one = scene([physics.Hull(WEDGE, 2.0, pos=(0, 1, 0))])
     assert from_toml(to_toml(one)) == one
-    with pytest.raises(ValueError, match=r"line 3: bodies\[0\]: points lie in one plane"):
+    with pytest.raises(ValueError, match=r"line 3: bodies\[0\]: Hull.points lie in one plane"):
         from_toml('[[bodies]]\nkind = "Hull"\npoints = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]\nmass = 1\n')
 
 

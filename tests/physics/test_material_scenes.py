@@ -106,7 +106,7 @@ def test_a_scene_file_holds_materials_and_names_the_line_of_a_wrong_one():
     text = to_toml(RICH)
     assert from_toml(text) == RICH
     for old, new, words in (
-        ("friction = 0.4", "friction = -1", r"scene, line \d+: bodies\[0\]: friction is -1"),
+        ("friction = 0.4", "friction = -1", r"scene, line \d+: bodies\[0\]: Block.friction of 'die' is -1"),
         ('rule = "minimum"', 'rule = "min"', r"scene, line \d+: effects\[2\]: Friction.rule is 'min'"),
         ('"floor", "die"', '"flor", "die"', r"scene, line \d+: Friction.pairs holds the end 'flor'"),
         ('name = "floor"', 'name = "die"', r"scene, line \d+: Scene.walls\[0\] has the name 'die'"),

@@ -54,7 +54,7 @@ def test_a_scene_file_gives_a_motion_by_hand():
     kind = "Contact"
     """
     assert from_toml(text).bodies[1].motion == physics.Motion.table((0, 1), [(0, 0, 0), (0, 1, 0)])
-    with pytest.raises(ValueError, match=r"line 10: bodies\[1\]: motion is .*; allowed are .*times"):
+    with pytest.raises(ValueError, match=r"line 10: bodies\[1\]: Block.motion is .*; allowed are .*times"):
         from_toml(text.replace("times", "time"))
 
 
