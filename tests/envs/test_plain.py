@@ -160,7 +160,10 @@ def test_a_scene_is_read_from_the_content_of_its_file():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"bodies": [{"kind": "Sphere", "radius": -1.0, "mass": 1.0}]}, "scene: bodies[0]: Sphere.radius is -1.0; allowed "),
+        (
+            {"bodies": [{"kind": "Sphere", "radius": -1.0, "mass": 1.0}]},
+            "scene: bodies[0]: Sphere.radius is -1.0; allowed ",
+        ),
         ({"bodies": {}}, "scene: bodies is {}; allowed are tables"),
         ({"walks": []}, "scene: walks is not known; allowed are walls, "),
         ({"format": 2}, "scene: format is 2; allowed is 1"),
