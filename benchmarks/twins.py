@@ -80,7 +80,7 @@ def hand_motion(task: Task, setting: str = "default") -> None:
         raise ValueError(f"setting is {setting!r}; allowed are {', '.join(SETTINGS)}")
     _check(task)
     task._advance = steps = MuJoCoSteps(task, SETTINGS[setting])
-    task.world.read_contact_sums = steps.read_contact_sums  # type: ignore[method-assign]
+    task.world.read_contact_sums = steps.read_contact_sums  # type: ignore[method-assign]  # MuJoCo has them
 
 
 def _check(task: Task) -> None:
