@@ -38,8 +38,9 @@ class Accuracy:
         Parts into which each `dt` is cut.
     scheme : str
         ``events``: smooth motion to `tolerance` between events, each located to rounding. Events are impacts, and the
-        times at which contacts begin, end, stick and slip. Where bodies touch each other, or hulls or bodies tied
-        together by springs touch walls, it is time stepping with error control instead. A substep is cut into parts,
+        times at which contacts begin, end, stick and slip. Where bodies touch each other, contact is compliant, or
+        hulls or bodies tied together by springs touch walls, it is time stepping with error control instead. A substep
+        is cut into parts,
         each of which agrees with two of half its length, to 100 tolerances of the body's size and speed. Impacts have
         times of their own. Other changes are found by halving, down to 2**-24 of the substep; `StepReport.fallbacks`
         counts those that are not.

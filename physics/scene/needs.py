@@ -56,7 +56,7 @@ class Needs:
         default rules (`physics.scene.materials`).
     lone : bool
         Whether exactly one body moves, and it can touch fixed bodies, none of them a compound; or it is `grained`, or a
-        cylinder that can touch walls.
+        cylinder that can touch walls, or contact is compliant.
     grouped : bool
         Whether collision groups keep some pairs apart that would touch otherwise, so that contact must ask for them.
     motion_columns : int
@@ -162,6 +162,7 @@ def find_needs(scene: Scene) -> Needs:
     shapes = None if have_axes(scene.bodies) else shape_table(scene.bodies)
     fields, materials = field_slots(scene.effects, len(scene.bodies), shapes), find_materials(scene)
     grained = touching and friction is not None and bool(friction.body_axes)
+    soft = touching and contact.stiffness is not None
     return Needs(
         contact, friction, gravity, touching, meeting, fixed,
         rubbing=touching and friction is not None,
@@ -169,7 +170,7 @@ def find_needs(scene: Scene) -> Needs:
         material_columns=WALL_COLUMNS * len(scene.walls) if touching and materials.act_at_walls else 0,
         walls_differ=touching and materials.differ_at_walls,
         pair_materials=meeting and materials.act_between_bodies,
-        lone=_is_lone(len(axes), kinds, touching, (meeting and fixed) or grained),
+        lone=_is_lone(len(axes), kinds, touching, (meeting and fixed) or grained or soft),
         grouped=grouped,
         motion_columns=motion_columns,
         grained=grained,

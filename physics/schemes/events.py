@@ -31,11 +31,7 @@ class EventDriven(Scheme):
         return INTEGRATORS[accuracy.scheme] == EVENTS
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        return (
-            objections.to_laws_of_stages(needs)
-            or objections.to_tangential(scene, needs)
-            or objections.to_sleeping(needs)
-        )
+        return objections.to_tangential(scene, needs) or objections.to_sleeping(needs)
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         materials = wall_materials(scene, switches)

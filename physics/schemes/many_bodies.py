@@ -16,7 +16,7 @@ from physics.kernels.multibody.stepping.adaptive_substep import (
     MIN_SOLVER_TOLERANCE,
 )
 from physics.kernels.multibody.stepping.step import step_many
-from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS
 from physics.kernels.state.groups import MultibodySwitches
 from physics.scene.body_axes import axis_table
 from physics.scene.effects import Contact, Friction
@@ -30,7 +30,7 @@ from physics.schemes.body_memory import BodyMemory
 from physics.schemes.material_tables import pair_materials, wall_materials
 from physics.schemes.scheme import Scheme, Switches, Worlds, records, settings
 
-_OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN))
+_OF_STAGES = frozenset((LAW_ROLLING, LAW_SPIN, LAW_STIFFNESS))
 """Contact laws that act over a stage, so that bodies at walls need stages under error control at `precise`."""
 
 
@@ -78,8 +78,7 @@ class ManyBodies(Scheme):
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
-        found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
+        found = objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
         return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:

@@ -5,35 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from physics.accuracy import Accuracy
-from physics.kernels.state.contact_law_dispatch import (
-    LAW_ANISOTROPY,
-    LAW_ROLLING,
-    LAW_SPIN,
-    LAW_STIFFNESS,
-    LAW_TANGENTIAL,
-)
+from physics.kernels.state.contact_law_dispatch import LAW_ANISOTROPY, LAW_TANGENTIAL
 from physics.scene.body_axes import axis_table
 from physics.scene.needs import Needs
 from physics.scene.scene import Scene
-
-DECLARED = {
-    LAW_TANGENTIAL: "Contact.tangential", LAW_ROLLING: "RollingFriction", LAW_SPIN: "SpinFriction",
-    LAW_ANISOTROPY: "Friction with two coefficients", LAW_STIFFNESS: "Contact.stiffness",
-}  # fmt: skip
-"""Names of the effects or fields that declare each contact law."""
-
-_OF_STAGES = (LAW_STIFFNESS,)
-
-
-def to_laws_of_stages(needs: Needs) -> str:
-    """Message against contact laws that act over a stage of time stepping only; "" if the scene has none."""
-    unknown = ", ".join(DECLARED[law] for law in needs.laws if law in _OF_STAGES)
-    if unknown:
-        return (
-            f"accuracy has the scheme 'events', which does not know {unknown}; allowed are 'fast', 'balanced' and "
-            "every time-stepping scheme: events are those of contacts that stay closed, not of springs of any depth"
-        )
-    return ""
 
 
 def to_sleeping(needs: Needs) -> str:

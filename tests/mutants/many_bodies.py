@@ -354,6 +354,14 @@ STEPPING = [
         "physics/test_compliance_between.py::test_springs_that_appear_do_not_push",
     ),
     _mutant(
+        "stepping-kept-depths",
+        "A part that is tried again finds the depths that its first trial has left.",
+        "stepping/snapshots.py",
+        "    copy_warm_depths(int(kept.memory[slot, WARM_CONTACT_COUNT]), kept.memory, slot, memory, world, many)\n",
+        "",
+        "physics/test_compliance_precise.py::test_a_ball_bobs_on_its_spring",
+    ),
+    _mutant(
         "stepping-tangential-aim",
         "An impact aims at the tangential velocity before it in one direction of the plane, not against it.",
         "stepping/bouncing.py",

@@ -299,17 +299,12 @@ def test_it_comes_back_from_a_file(tmp_path):
         physics.save_mjcf(scene, tmp_path / "scene.xml")
 
 
-def at_precise():
-    return world(ball(), accuracy="precise")
-
-
 BAD = [
     (lambda: physics.Contact(stiffness=0), r"Contact.stiffness is 0.0; allowed are numbers greater than 0"),
     (lambda: physics.Contact(stiffness=1, damping=-1), r"Contact.damping is -1.0; allowed are numbers of at least 0"),
     (lambda: physics.Contact(damping=1), "Contact.damping is 1.0; allowed without a stiffness is 0"),
     (lambda: physics.Contact(0.5, stiffness=1), "Contact.restitution is 0.5 with a stiffness; allowed is None"),
     (lambda: physics.Contact(tangential=0, stiffness=1), "Contact.tangential is 0.0 with a stiffness; allowed is None"),
-    (at_precise, "scheme 'events', which does not know Contact.stiffness; allowed are 'fast'"),
 ]
 
 

@@ -36,3 +36,10 @@ def store_warm_depth(k, to, world, memory, many):
 def move_warm_depth(k, to, world, memory, many):
     """Move the depth of stored contact k to stored contact `to`."""
     memory[world, depth_column(to, many)] = memory[world, depth_column(k, many)]
+
+
+@if_given("many.compliance")
+def copy_warm_depths(count, source, i, target, j, many):
+    """Copy the depths of the first `count` stored contacts from row i of `source` to row j of `target`."""
+    for c in range(depth_column(0, many), depth_column(count, many)):
+        target[j, c] = source[i, c]

@@ -16,7 +16,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.compliance import plus_give, plus_give_velocity
+from physics.kernels.multibody.data.compliance import answer_of_spring, per_spring, plus_give, plus_give_velocity
 from physics.kernels.multibody.data.contact_set import add_scaled, contact_velocity, put_vector, row_matrix
 from physics.kernels.multibody.data.grain import stretched_inv_mass
 
@@ -87,16 +87,17 @@ def _add_mobility(k, b, first, W, many):
 def assemble_contact_blocks(n, many):
     """Write the diagonal Delassus block of each of the n contacts, and apply the warm start; return the scale [m/s].
 
-    The scale is the largest velocity error of a contact without any impulse. The impulses of the warm start are then
-    added to the twists.
+    The scale is the largest velocity error of a contact without any impulse; of a compliant one under error control, it
+    is the speed with which its spring answers. The impulses of the warm start are then added to the twists.
     """
     scale = 0.0
     for k in range(n):
         u, t = contact_velocity(k, many), row_vector(many.contacts.target, k, 0)
-        scale = max(scale, max(abs(u[0] - t[0]), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
         W = _add_mobility(k, many.contacts.bodies[k, 0], 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), many)
         if many.contacts.bodies[k, 1] >= 0:
             W = _add_mobility(k, many.contacts.bodies[k, 1], 3, W, many)
+        normal = answer_of_spring(k, u[0] - t[0], W[0], many)
+        scale = max(scale, max(abs(normal), max(abs(u[1] - t[1]), abs(u[2] - t[2]))))
         B = many.contacts.block
         B[k, 0], B[k, 1], B[k, 2] = plus_give(k, W[0], many), W[1], W[2]
         B[k, 3], B[k, 4], B[k, 5] = W[1], W[3], W[4]
@@ -145,13 +146,9 @@ def _normal_map(p, u, W):
 @inlined
 def contact_residual(k, many):
     """Natural-map residual of contact k at its present impulse [m/s]."""
-    return natural_map_residual(
-        row_vector(many.contacts.impulse, k, 0),
-        velocity_error(k, many),
-        many.contacts.block[k, 0],
-        many.contacts.step[k],
-        many.contacts.mu[k],
-    )
+    step = many.contacts.step[k]
+    u, normal = per_spring(velocity_error(k, many), many.contacts.block[k, 0], step, many)
+    return natural_map_residual(row_vector(many.contacts.impulse, k, 0), u, normal, step, many.contacts.mu[k])
 
 
 @kernel
@@ -164,7 +161,8 @@ def max_contact_residual(first, last, friction, many):
     for i in range(first, last):
         k = many.islands.contacts[i]
         if friction is None:
-            miss = _normal_map(many.contacts.impulse[k, 0], velocity_error(k, many)[0], many.contacts.block[k, 0])
+            u, normal = per_spring(velocity_error(k, many), many.contacts.block[k, 0], many.contacts.step[k], many)
+            miss = _normal_map(many.contacts.impulse[k, 0], u[0], normal)
         else:
             miss = contact_residual(k, many)
         if not miss <= worst:  # also true for NaN

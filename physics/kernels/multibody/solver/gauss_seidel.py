@@ -16,7 +16,7 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_solver.one_contact import CONTACT_UNSOLVED, friction_direction, solve_contact_block
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.compliance import plus_give_velocity
+from physics.kernels.multibody.data.compliance import per_spring, plus_give_velocity
 from physics.kernels.multibody.data.contact_set import put_vector, subtract
 from physics.kernels.multibody.solver.contact_operator import (
     max_contact_residual,
@@ -273,13 +273,9 @@ def _flag_unsolved(count, small, many):
     worst = 0.0
     for i in range(count):
         R = many.sweeps.visit_rows
-        miss = natural_map_residual(
-            row_vector(R, i, VISIT_IMPULSE),
-            visit_velocity_error(i, many),
-            R[i, VISIT_BLOCK],
-            1.0 / R[i, VISIT_LAMBDA_MAX],
-            R[i, VISIT_MU],
-        )
+        step = 1.0 / R[i, VISIT_LAMBDA_MAX]
+        u, normal = per_spring(visit_velocity_error(i, many), R[i, VISIT_BLOCK], step, many)
+        miss = natural_map_residual(row_vector(R, i, VISIT_IMPULSE), u, normal, step, R[i, VISIT_MU])
         many.sweeps.visited[i] = 0 if miss <= small else _MUST_VISIT
         _mark_pushed(many.sweeps.visit_bodies[i, 0], many.sweeps.visit_bodies[i, 1], 0, many)
         if not miss <= worst:  # also true for NaN

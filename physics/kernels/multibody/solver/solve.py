@@ -31,6 +31,7 @@ import math
 
 from physics.compiler.decorators import if_given, inlined, kernel, shared_kernel
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.compliance import rigid_mobility
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.solver.block_lu import TWIST_DOFS
 from physics.kernels.multibody.solver.contact_operator import (
@@ -273,7 +274,7 @@ def max_impulse_speed(first, last, many):
     for i in range(first, last):
         k = many.islands.contacts[i]
         p = row_vector(many.contacts.impulse, k, 0)
-        most = max(most, many.contacts.block[k, 0] * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
+        most = max(most, rigid_mobility(k, many) * max(abs(p[0]), max(abs(p[1]), abs(p[2]))))
     return most
 
 

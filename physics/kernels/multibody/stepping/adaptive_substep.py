@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import if_given, inlined, kernel
+from physics.kernels.multibody.stepping.compliant_stage import trials_of_springs
 from physics.kernels.multibody.stepping.lone_part import step_first_part, step_lone_part
 from physics.kernels.multibody.stepping.part import UNITS_PER_SUBSTEP, following_part, max_body_error, step_part
 from physics.kernels.multibody.stepping.snapshots import (
@@ -30,7 +31,7 @@ from physics.kernels.state.fixed_body import is_fixed
 
 # If the shortest part is above the allowed error, or after so many trials, the shortest part becomes this many times
 # longer for the rest of the substep. Otherwise motion that rattles without end would take parts without end. There are
-# 12 such lengths, so that a substep ends after some 600 trials.
+# 12 such lengths, so that a substep ends after some 600 trials, and those that springs of contacts ask for.
 _COARSENING_FACTOR = 4
 _MAX_TRIALS = 50
 
@@ -125,7 +126,7 @@ def step_with_error_control(world, start, h, switches, kept, records, many):
     If the shortest part is above the allowed error, too, it is accepted and reported as a fallback. The shortest part
     is then longer for the rest of this substep.
     """
-    place, shortest, unit, patience = 0, 1, h / UNITS_PER_SUBSTEP, _MAX_TRIALS
+    place, shortest, unit, patience = 0, 1, h / UNITS_PER_SUBSTEP, _MAX_TRIALS + trials_of_springs(h, many)
     next_part = records.memory.shape[1] - 1
     many.settings[0].half_load_speed = _min_load_speed(0.5 * h, many)  # least scale of contact problems
     part = int(records.memory[world, next_part] * UNITS_PER_SUBSTEP)

@@ -45,8 +45,15 @@ from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, sl
 from physics.kernels.multibody.data.driven_bodies import driven_work
 from physics.kernels.multibody.data.warm_depths import depth_column
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
+from physics.kernels.multibody.stepping.allowed_error import allowed_depth
 from physics.kernels.state import layout as at
 from physics.kernels.state.fixed_body import is_fixed
+
+# Points whose springs may push a body at once, and that turning may raise its mobility by; parts in which an
+# oscillation turns by a radian at the least tolerance; and the angle beyond which a substep leaves springs unresolved.
+_POINTS = 8.0
+_TRIALS_PER_RADIAN = 1000.0
+_MAX_ANGLE = 20.0
 
 
 @inlined
@@ -93,7 +100,8 @@ def _paid_share(b, many):
     """Share of the depths of body b that forces have caused."""
     if b < 0 or not many.compliance.found[b] > many.compliance.paid[b]:
         return 1.0
-    return math.sqrt(many.compliance.paid[b] / many.compliance.found[b])
+    found, paid = many.compliance.found[b], many.compliance.paid[b]
+    return 1.0 if math.sqrt(found) <= math.sqrt(paid) + allowed_depth(b, many) else math.sqrt(paid / found)
 
 
 @inlined
@@ -138,6 +146,24 @@ def split_stage(n, world, h, memory, many):
     theta = max(0.5, 1.0 - 1.0 / (rate * h)) if n > 0 else 0.5
     many.compliance.last_drift[0] = theta * h
     return (1.0 - theta) * h, theta * h
+
+
+def _no_trials(h, many):
+    return 0
+
+
+@if_given("many.compliance", _no_trials)
+def trials_of_springs(h, many):
+    """Number of parts that springs may ask for in a substep of h [s] under error control, refused ones included.
+
+    It goes with the angle by which the fastest spring oscillates, up to `_MAX_ANGLE`: stiffer springs are not resolved.
+    """
+    rate, body = 0.0, many.bodies.body[0]
+    for b in range(many.bodies.state.shape[0]):
+        if not is_fixed(b, many.bodies):
+            w = _POINTS * many.bodies.inv_mass[b]
+            rate = max(rate, max(math.sqrt(contact_stiffness(body) * w), contact_damping(body) * w))
+    return int(_TRIALS_PER_RADIAN * min(rate * h, _MAX_ANGLE))
 
 
 @inlined
@@ -220,11 +246,14 @@ def energy_with_springs(n, h, many):
 def measure_from_due_depth(n, many):
     """Measure the gaps of the n contacts from the depth that the contact problem has foretold, after a stage.
 
-    Compliances are cleared, since positions are corrected as those of rigid bodies.
+    Compliances are cleared, since positions are corrected as those of rigid bodies. Under error control no correction
+    follows a depth that is within the error of a part.
     """
     for k in range(n):
         many.compliance.give[k] = 0.0
         many.contacts.gap[k] -= min(many.compliance.end_gap[k], 0.0)
+        if abs(many.contacts.gap[k]) <= allowed_depth(many.contacts.bodies[k, 0], many):
+            many.contacts.gap[k] = 0.0
 
 
 def _share_of_depth(gap, goal, many):

@@ -72,6 +72,15 @@ def _project(world, h, switches, memory, many):
         update_body_pose(b, offset_frame, many)
 
 
+def _close_gaps(world, h, switches, memory, many):
+    _project(world, h, switches, memory, many)
+
+
+@if_given("many.compliance", _close_gaps)
+def _project_rigid(world, h, switches, memory, many):
+    """Leave compliant contacts as deep as their springs hold them."""
+
+
 @if_given("many.lone")
 def project_constraints(world, h, switches, memory, many):
     """Close the gaps of the contacts that pushed in a stage of length h [s] that has just ended.
@@ -79,4 +88,4 @@ def project_constraints(world, h, switches, memory, many):
     Only under error control. `world` is the index of the world, `memory` has its warm starts.
     """
     if many.settings[0].is_error_controlled == 1:
-        _project(world, h, switches, memory, many)
+        _project_rigid(world, h, switches, memory, many)

@@ -20,9 +20,9 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
 from physics.kernels.multibody.data.lone_body import lone_body
+from physics.kernels.multibody.stepping.allowed_error import allowed_error
 from physics.kernels.multibody.stepping.constraint_projection import project_constraints
 from physics.kernels.multibody.stepping.part import (
-    ERROR_PER_TOLERANCE,
     following_part,
     max_body_error,
     step_part,
@@ -103,11 +103,10 @@ def _hidden_error(error, place, lengths, unit, offset_frame, kept, many):
     one, in units of `unit` [s].
     """
     part, following = lengths
-    allowed = ERROR_PER_TOLERANCE * many.settings[0].tolerance
     sudden = (
         _SUDDEN_WEIGHT
-        / allowed
-        * sudden_change(allowed * error, part * unit, following * unit, offset_frame, kept, many)
+        / allowed_error(many)
+        * sudden_change(allowed_error(many) * error, part * unit, following * unit, offset_frame, kept, many)
     )
     if sudden > 1.0:
         many.lone.suspect[0] = place + part + following

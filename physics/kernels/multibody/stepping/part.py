@@ -7,16 +7,13 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import set_clock
 from physics.kernels.multibody.data.contact_set import subtract
+from physics.kernels.multibody.stepping.allowed_error import allowed_error
 from physics.kernels.multibody.stepping.snapshots import SNAPSHOT_COARSE
 from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state.body import angular_velocity, read_state
 
 # Units in a substep. The shortest part is one unit long at first.
 UNITS_PER_SUBSTEP = 2**24
-
-# Allowed error of a part, in tolerances of the contact problem. The residual of a solve changes velocities by a few
-# tolerances, however short the part is.
-ERROR_PER_TOLERANCE = 100.0
 
 # Rounding of a position, in units of its last place.
 _POSITION_ROUNDING = 16.0 * 2.0**-52
@@ -54,7 +51,7 @@ def _body_error(b, offset_frame, kept, many):
 @inlined
 def max_body_error(offset_frame, kept, many):
     """Largest error of any body (`_body_error`), as a multiple of the allowed error."""
-    worst, allowed = 0.0, ERROR_PER_TOLERANCE * many.settings[0].tolerance
+    worst, allowed = 0.0, allowed_error(many)
     for b in range(many.bodies.state.shape[0]):
         found = _body_error(b, offset_frame, kept, many) / allowed
         if not found <= worst:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from physics.compiler.decorators import inlined
 from physics.kernels.multibody.data.arrays import WARM_CONTACT_COUNT, WARM_CONTACT_SIZE, WARM_HEADER_SIZE
+from physics.kernels.multibody.data.warm_depths import copy_warm_depths
 from physics.kernels.multibody.data.warm_torques import copy_warm_torques
 from physics.kernels.state import layout as at
 
@@ -24,6 +25,7 @@ def save_snapshot(slot, world, kept, memory, report, many, counts):
     for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(memory[world, WARM_CONTACT_COUNT])):
         kept.memory[slot, c] = memory[world, c]
     copy_warm_torques(int(memory[world, WARM_CONTACT_COUNT]), memory, world, kept.memory, slot, many)
+    copy_warm_depths(int(memory[world, WARM_CONTACT_COUNT]), memory, world, kept.memory, slot, many)
     for c in range(at.REPORT_SIZE):
         kept.report[slot, c] = report[world, c]
     for b in range(many.bodies.state.shape[0]):
@@ -42,6 +44,7 @@ def restore_snapshot(slot, world, kept, memory, report, many, counts):
     for c in range(WARM_HEADER_SIZE + WARM_CONTACT_SIZE * int(kept.memory[slot, WARM_CONTACT_COUNT])):
         memory[world, c] = kept.memory[slot, c]
     copy_warm_torques(int(kept.memory[slot, WARM_CONTACT_COUNT]), kept.memory, slot, memory, world, many)
+    copy_warm_depths(int(kept.memory[slot, WARM_CONTACT_COUNT]), kept.memory, slot, memory, world, many)
     for c in range(at.REPORT_SIZE):
         if c != at.SOLVES and c != at.ITERATIONS:
             report[world, c] = kept.report[slot, c]
