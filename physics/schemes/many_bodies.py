@@ -79,8 +79,7 @@ class ManyBodies(Scheme):
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
         found = objections.to_laws_of_stages(needs) if self.is_error_controlled else ""
-        found = found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
-        return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
+        return found or objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)
