@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import pickle
 
@@ -12,6 +13,7 @@ import physics
 from physics import scenes
 from physics.accuracy import resolve
 from tests.physics.test_sleeping import BLOCK, DT, MU, RADIUS, STEPS, WEIGHT, G, force, on_edge, sleeping
+from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
 
@@ -33,7 +35,7 @@ def asleep_world(**options):
 # --- truths ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("accuracy", ["precise", "reference"])
+@pytest.mark.parametrize("accuracy", sweep(["precise", "reference"], ["precise"]))
 def test_a_block_at_rest_sleeps_for_nothing_and_wakes_with_the_bits_of_one_that_never_slept(accuracy):
     """The scheme keeps a body at rest to the last bit, and so does sleep; the contact memory stays as well."""
     world, awake = worlds(accuracy=accuracy)
@@ -82,8 +84,9 @@ def test_a_creep_above_the_threshold_keeps_its_bits_and_one_below_ends_within_it
         assert np.array_equal(world.memory, awake.memory)
 
 
-@pytest.mark.parametrize("slops", [4.0, 1e4])
-@pytest.mark.parametrize("periods", [1, 2])
+@pytest.mark.parametrize(("periods", "slops"), sweep(
+    itertools.product([1, 2], [4.0, 1e4]), [(1, 1e4)],
+))  # fmt: skip
 def test_a_bounce_in_a_period_that_divides_the_step_does_not_sleep(periods, slops):
     """From H = g (dt/periods)²/8 the block is back at its highest point, without velocity, after each step."""
     height = G * (DT / periods) ** 2 / 8
