@@ -126,6 +126,21 @@ def test_a_block_that_friction_holds_against_a_spring_sleeps():
     assert world.pos[0, 0, 0] == 0.1
 
 
+@pytest.mark.parametrize(("lift", "does_sleep"), [(0.0, True), (1e-3, False)])
+def test_a_body_that_floats_sleeps_in_its_equilibrium_and_bobs_on_beside_it(lift, does_sleep):
+    """Half as dense as the fluid, a cube floats with its centre in the surface; no contact holds it there."""
+    fluid = physics.Buoyancy(offset=5.0, density=1000.0), physics.Drag(1.0, density=1000.0)
+    cube = physics.Block((1, 1, 1), 500.0, pos=(0, 5.0 + lift, 0))
+    scene = physics.Scene([cube], [physics.HalfSpace((0, 1, 0))], [physics.Gravity(), physics.Contact(), *fluid])
+    world, awake = worlds(scene, time=5 * DT)
+    for one in (world, awake):
+        one.step(steps=30)
+    assert world.asleep.all() == does_sleep
+    missing = 6 * 4 * resolve("precise").slop * cube.bounding_radius(cube.dimensions) if does_sleep else 0.0
+    assert np.abs(world.pos[0, 0] - (0, 5, 0)).max() <= lift + missing
+    assert np.abs(world.pos - awake.pos).max() <= missing
+
+
 @pytest.mark.exhaustive
 def test_from_a_small_offset_a_cube_falls_off_its_edge_as_if_it_never_slept():
     world, awake = worlds(on_edge(1e-6))
