@@ -69,7 +69,8 @@ class Accuracy:
     slop : float
         Gap within which a feature touches a wall, in bounding radii. Without ``events`` the position of an impact has
         an error of up to one slop. With ``events`` a rebound at most a few slops high is left out, and the slop is at
-        least 1e-12 where bodies touch each other, 1e-10 where one moves among fixed ones.
+        least 1e-12 where bodies touch each other, 1e-10 where one moves among fixed ones. `Sleeping` takes motions of
+        a few slops, of 1e-12 among fixed bodies, for rest.
     rest_share : float
         Bounce threshold of time stepping: a rebound that would be over within this share of the substep is not made
         (restitution acts as 0). 0 lets every rebound happen.

@@ -328,13 +328,17 @@ class Sleeping(Effect):
     displacements of its bodies stay below the threshold in two successive windows of time, and at most double from the
     first to the second. A sleeping body keeps its place to the last bit, has no velocity, and costs next to nothing.
     It wakes when its wrench changes, when an awake body comes near, or when a user changes the world
-    (`World.set_state`, `World.set_parameters`).
+    (`World.set_state`, `World.set_parameters`). Bodies that touch walls only sleep and wake alone.
+
+    It acts at every preset. At ``precise`` and ``reference`` the motion that sleep stops, a few slops per window, is
+    below the tolerance. There a body also needs an equilibrium of forces. So it stays awake if a bounce brings it back
+    to its highest point at the end of each step.
 
     Parameters
     ----------
     slops : float
         Threshold of the displacement of any point of a body within a window, in units of `Accuracy.slop` times the
-        body's bounding radius; more than 0.
+        body's bounding radius; more than 0. A slop that the scheme raises to its least value counts as raised.
     time : float, optional
         Length of a window [s]; more than 0. None: √(2 r/a), the time in which the body would fall its bounding radius r
         at the acceleration a that it would have without contact. A body without such an acceleration does not sleep.

@@ -8,7 +8,7 @@ import numpy as np
 
 from physics.accuracy import EVENTS, INTEGRATORS, Accuracy
 from physics.kernels.event_driven.step import step_events
-from physics.kernels.event_driven.workspace import make_motion
+from physics.kernels.event_driven.workspace import Workspaces, make_motion
 from physics.kernels.time_stepping.workspace import make_workspace
 from physics.scene.needs import Needs
 from physics.scene.scene import Scene
@@ -31,7 +31,7 @@ class EventDriven(Scheme):
         return INTEGRATORS[accuracy.scheme] == EVENTS
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        return objections.to_tangential(scene, needs) or objections.to_sleeping(needs)
+        return objections.to_tangential(scene, needs)
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         materials = wall_materials(scene, switches)
@@ -43,7 +43,8 @@ class EventDriven(Scheme):
     def arguments(self, worlds: Worlds, k: int) -> tuple:
         plan = worlds.plan
         switches = plan.of_contact, plan.restitution, plan.of_flight
-        return *switches, records(worlds), worlds.scratch[k], worlds.motions[k]
+        workspaces = Workspaces(worlds.scratch[k], worlds.motions[k])
+        return *switches, worlds.sleep_of_kernel(), records(worlds), workspaces
 
 
 SCHEMES = (EventDriven(),)

@@ -78,8 +78,7 @@ class ManyBodies(Scheme):
         return ((needs.touching and is_coupled) or needs.fixed) and is_precise == self.is_error_controlled
 
     def objection(self, scene: Scene, needs: Needs, accuracy: Accuracy) -> str:
-        found = objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
-        return found or (objections.to_sleeping(needs) if self.is_error_controlled else "")
+        return objections.to_tangential(scene, needs) or objections.to_axes_of_walls(scene, needs)
 
     def make_scratch(self, scene: Scene, switches: Switches, walls: np.ndarray, accuracy: Accuracy) -> Any:
         bodies, accuracy = len(scene.bodies), self.acting(accuracy)

@@ -11,16 +11,6 @@ from physics.scene.needs import Needs
 from physics.scene.scene import Scene
 
 
-def to_sleeping(needs: Needs) -> str:
-    """Message against the effect `Sleeping`, for schemes in which bodies cannot sleep; "" if the scene lacks it."""
-    if needs.sleeping:
-        return (
-            "accuracy has the scheme 'events', which does not know Sleeping; allowed are 'fast', 'balanced' and every "
-            "time-stepping scheme: a threshold of motion is an error that its tolerance does not bound"
-        )
-    return ""
-
-
 def to_tangential(scene: Scene, needs: Needs) -> str:
     """Message against tangential restitution in a scene with bodies other than spheres; "" if there is no conflict."""
     for b, body in enumerate(scene.bodies if LAW_TANGENTIAL in needs.laws else ()):

@@ -224,4 +224,5 @@ class Batch(Exclusive):
         if not self.plan.sleeping:
             return None
         effect: Any = self.scene.effect(Sleeping)
-        return Sleep(self.sleep, effect.slops * self.accuracy.slop, effect.time or 0.0)
+        slop = self.plan.scheme.acting(self.accuracy).slop
+        return Sleep(self.sleep, effect.slops * slop, effect.time or 0.0)

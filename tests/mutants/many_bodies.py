@@ -166,6 +166,14 @@ DATA = [
         "found[root, 2] = 0.0",
         "physics/test_sleeping_bodies.py::test_what_touches_something_in_motion_does_not_sleep",
     ),
+    _mutant(
+        "data-equilibrium",
+        "A ball falls asleep in the air, at its highest point.",
+        "data/equilibrium.py",
+        "        if not way <=",
+        "        if 0.0 * way >",
+        "physics/test_sleeping_parts.py::test_a_bounce_in_a_period_of_the_step_does_not_sleep",
+    ),
 ]
 
 NARROWPHASE = [
@@ -345,6 +353,14 @@ SOLVER = [
 _CASE = "hard_cases/test_cases.py::test_the_case_comes_out_as_it_must"
 
 STEPPING = [
+    _mutant(
+        "stepping-part-asleep",
+        "The second half of a part steps sleeping bodies, too.",
+        "stepping/adaptive_substep.py",
+        "step_part(world, start + half, half, switches, sleep, records, many)",
+        "step_part(world, start + half, half, switches, None, records, many)",
+        "physics/test_sleeping_parts.py::test_a_sleeper_keeps_its_place_through_the_parts_of_others",
+    ),
     _mutant(
         "stepping-paid",
         "A depth that no force has caused pushes.",

@@ -346,6 +346,23 @@ EVENT_DRIVEN = [
         "matrix[i, k] = s * smooth.jacobian[i, k]",
         "physics/test_events_slow_slide.py::test_the_cost_of_a_slow_slide_does_not_grow_with_its_stiffness",
     ),
+    _mutant(
+        "event-driven-turning-point",
+        "A body falls asleep at its turning point.",
+        "event_driven/falling_asleep.py",
+        "acceleration_bound(y, offset_frame, scratch, motion) <=",
+        "0.0 <=",
+        "physics/test_sleeping_precise.py::test_a_bounce_in_a_period_that_divides_the_step_does_not_sleep",
+    ),
+    _mutant(
+        "event-driven-wake",
+        "A sleeping body is left out of a step under a new wrench.",
+        "event_driven/step.py",
+        "if sleep is not None and remains_asleep(i, bodies.wrench, sleep):",
+        "if sleep is not None and sleep.rows[i, 0] > 0.0:",
+        "physics/test_sleeping_precise.py::"
+        "test_a_block_at_rest_sleeps_for_nothing_and_wakes_with_the_bits_of_one_that_never_slept",
+    ),
 ]
 
 PARALLEL = [

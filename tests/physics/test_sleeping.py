@@ -162,7 +162,7 @@ class WithSleep(Setting):
 @pytest.mark.parametrize(
     ("name", "accuracy"),
     sweep(
-        itertools.product(["on-edge", "on-vertex", "dominoes"], ["fast", "balanced"]),
+        itertools.product(["on-edge", "on-vertex", "dominoes"], ["fast", "balanced", "precise"]),
         [("on-edge", "balanced"), ("on-vertex", "fast")],
     ),
 )

@@ -47,7 +47,7 @@ def push(world, body, x):
     return wrench
 
 
-@pytest.mark.parametrize("accuracy", ["fast", "balanced"])
+@pytest.mark.parametrize("accuracy", sweep(["fast", "balanced", "precise"], ["fast", "balanced"]))
 @pytest.mark.parametrize("count", [
     pytest.param(1, marks=pytest.mark.interpreted), *sweep([3, 10, 50], [10]),
 ])  # fmt: skip

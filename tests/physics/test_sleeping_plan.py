@@ -7,7 +7,7 @@ import pytest
 import physics
 from physics.accuracy import resolve
 from physics.plan.explanation import Row
-from tests.physics.test_sleeping import BLOCK, sleeping
+from tests.physics.test_sleeping import BLOCK
 
 
 def plan(*effects, accuracy="balanced", walls=BLOCK.walls):
@@ -30,6 +30,14 @@ def test_undeclared_nothing_of_it_is_there():
     assert "nothing can touch" in plan(physics.Sleeping(), walls=()).explain()
 
 
+@pytest.mark.parametrize("accuracy", ["fast", "balanced", "precise", "reference"])
+def test_it_acts_at_every_preset(accuracy):
+    with_it, without = plan(physics.Sleeping(), accuracy=accuracy), plan(accuracy=accuracy)
+    assert [(a, b) for a, b in zip(with_it.key, without.key) if a != b] == [(True, None)]
+    assert row_of(with_it).is_on
+    assert with_it.scheme is without.scheme
+
+
 def test_under_loads_that_may_change_by_themselves_nothing_sleeps():
     gusts = (physics.Sleeping(), physics.Drag(), physics.Wind(gust=1.0))
     assert not plan(*gusts).sleeping
@@ -47,7 +55,6 @@ def test_under_loads_that_may_change_by_themselves_nothing_sleeps():
         (lambda: physics.Sleeping(slops=0), "Sleeping.slops is 0"),
         (lambda: physics.Sleeping(time=-1), "Sleeping.time is -1"),
         (lambda: physics.Scene(BLOCK.bodies, effects=[physics.Sleeping()]), "Sleeping without Contact"),
-        (lambda: physics.World(sleeping(BLOCK), accuracy="precise"), "'events', which does not know Sleeping"),
     ],
 )
 def test_what_is_asked_wrongly_is_refused(make, message):

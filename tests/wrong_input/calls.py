@@ -57,8 +57,6 @@ WORLDS = rows(
     ("world-keyword", lambda: world(acuracy="fast"), ("World got an", "'acuracy' (given: 'fast')", "are accuracy,")),
     ("sequential-without-events", lambda: world(accuracy=p.Accuracy(collisions="sequential")),
      ("Accuracy.collisions is 'sequential'", "events")),
-    ("sleeping-with-events", lambda: p.World(scene(p.Contact(), p.Sleeping()), accuracy="precise"),
-     ("accuracy has the scheme 'events'", "Sleeping", "fast")),
     ("tangential-of-a-block", lambda: p.World(TILTED), ("Contact.tangential is 0.5", "bodies[0] is a block", "sphere")),
     ("inside-a-wall", lambda: p.World(p.Scene([ball(pos=(0, 0, 0))], p.three_walls(), [p.Contact()])),
      ("pos [0.0, 0.0, 0.0] of body 0", "inside walls[0]", "at most 0.01 m")),

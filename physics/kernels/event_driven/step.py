@@ -12,6 +12,7 @@ mass and inertia, f the load, J the Jacobian of the contacts, u their velocities
                       extrapolated to the tolerance
 6. Correct positions  y is projected onto g_n = 0, u_n = 0 of the contacts                 `project_state`
 7. Rest               the body stays where it is until its load changes                    `come_to_rest`
+8. Sleep              a body whose motion stays below a threshold is left out              `settles_down`
 
 A rebound below a threshold of speed is not made. It would begin a sequence of bounces, t/(1 - e) long for a first
 bounce of length t. This sequence is left out, and its time is added to that of the event that ends it. If no contact
@@ -52,6 +53,7 @@ from physics.kernels.event_driven.contact_candidates import (
     MODE_UNDECIDED_SLIDING,
 )
 from physics.kernels.event_driven.contact_mode import find_contact_mode
+from physics.kernels.event_driven.falling_asleep import settles_down
 from physics.kernels.event_driven.guards import FORCE_GUARDS, GUARD_NONE, GUARD_STEP_FAILED, GUARD_WATCH
 from physics.kernels.event_driven.impact import (
     drift_at_velocity,
@@ -64,7 +66,7 @@ from physics.kernels.event_driven.mode_acceptance import TRUST_GROWTH, TRUST_SHR
 from physics.kernels.event_driven.mode_transitions import load_contact_modes, log_mode_changes, store_contact_modes
 from physics.kernels.event_driven.smooth_segment import body_speed_bound, integrate_segment, predict_state
 from physics.kernels.event_driven.time_of_impact import count_unresolved_flight, fly_freely, fly_to_wall
-from physics.kernels.event_driven.workspace import Motion
+from physics.kernels.event_driven.workspace import Motion, Workspaces
 from physics.kernels.forces.held_loads import bind_fields, refresh_loads, set_clock
 from physics.kernels.math import quaternion as qt
 from physics.kernels.parallel.work_stealing import for_each_world
@@ -80,6 +82,7 @@ from physics.kernels.state.body import (
     write_state,
 )
 from physics.kernels.state.contact_law_dispatch import bind_laws
+from physics.kernels.state.sleeping import remains_asleep, without_velocities
 from physics.kernels.time_stepping import event_log as ev
 
 # Gaps below this share of the coordinates that they are differences of are rounding. For the second constant see
@@ -279,18 +282,22 @@ def _take_substep(y, h, contact, flight, scratch, motion, records, start):
 
 
 @inlined
-def advance_world(world, grid, bodies, contact, restitution, flight, records, scratch, motion):
+def advance_world(world, grid, bodies, contact, restitution, flight, sleep, records, workspaces):
     """Advance each body of a world by `grid.steps` steps, from event to event; write states, report and events.
 
     Events go to `records.log`, their number to `records.counts`. A body whose new state is not finite keeps the old
-    one, and the report counts a fault. The groups of arguments are those of `physics.kernels.state.groups`.
+    one, and the report counts a fault. Sleeping bodies are left out; `sleep` is None where the scene does not declare
+    sleep. The groups of arguments are those of `physics.kernels.state.groups`.
     """
+    scratch, motion = workspaces.scratch, workspaces.motion
     body = scratch.body
     h, count = grid.h, bodies.shapes.shape[0]
     clear_report(world, records.report)
     for b in range(count):
         i = world * count + b
         records.counts[i] = 0
+        if sleep is not None and remains_asleep(i, bodies.wrench, sleep):
+            continue
         bind_body(world, i, bodies.shapes[b], bodies, contact.friction, restitution, flight.offset_frame, body)
         if not has_finite_loads(body):
             report_fault(world, b, records.report)
@@ -308,6 +315,9 @@ def advance_world(world, grid, bodies, contact, restitution, flight, records, sc
                 ev.note_mode_change(records.log, records.counts, i, k * h, ev.KIND_FAULT, -1)
                 break
             y = new
+            if sleep is not None and settles_down(i, y, h, sleep, flight.offset_frame, scratch, motion):
+                y = without_velocities(y)
+                break
         write_state(bodies.state, i, y)
         w = angular_velocity(y[1], y[3], body, flight.offset_frame)
         bodies.state[i, at.ANGVEL], bodies.state[i, at.ANGVEL + 1], bodies.state[i, at.ANGVEL + 2] = w
@@ -317,11 +327,12 @@ _advance_worlds = for_each_world(advance_world)
 
 
 @kernel
-def step_events(queue, grid, bodies, contact, restitution, flight, records, scratch, motions):
+def step_events(queue, grid, bodies, contact, restitution, flight, sleep, records, workspaces):
     """Advance all worlds that the calling thread can take from `queue`, from event to event (`advance_world`).
 
-    `scratch` and `motions` are the thread's workspace and `Motion`, with arrays of one record.
+    `workspaces` are those of the thread, a `Workspaces` with arrays of one record.
     """
+    motions = workspaces.motion
     motion = Motion(
         motions.thresholds[0],
         motions.pace[0],
@@ -330,4 +341,5 @@ def step_events(queue, grid, bodies, contact, restitution, flight, records, scra
         motions.candidates[0],
         motions.smooth[0],
     )
-    _advance_worlds(queue, (grid, bodies, contact, restitution, flight, records, scratch[0], motion))
+    inner = Workspaces(workspaces.scratch[0], motion)
+    _advance_worlds(queue, (grid, bodies, contact, restitution, flight, sleep, records, inner))

@@ -75,6 +75,13 @@ def _pace_fields() -> list[tuple]:
     ]  # fmt: skip
 
 
+class Workspaces(NamedTuple):
+    """Both workspaces of a thread, arrays of one record in Python, records in a kernel."""
+
+    scratch: np.ndarray  # of `physics.kernels.time_stepping.workspace`
+    motion: Motion
+
+
 def _contact_fields(contacts: int, slots: int) -> list[tuple]:
     f, i, n = np.float64, np.int64, contacts
     return [

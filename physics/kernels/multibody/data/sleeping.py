@@ -13,6 +13,7 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.two_body_spring import unite_linked_bodies
 from physics.kernels.math.union_find import find_root, unite_sets
 from physics.kernels.multibody.data.arrays import NUM_PAIRS
+from physics.kernels.multibody.data.equilibrium import keep_unbalanced_awake
 from physics.kernels.multibody.data.parts import acting_bodies
 from physics.kernels.state.body import read_state, write_state
 from physics.kernels.state.fixed_body import is_fixed
@@ -148,8 +149,11 @@ def put_quiet_groups_to_sleep(world, sleep, many):
 
 
 @kernel
-def update_sleep(world, h, sleep, many):
-    """Update the sleep windows of all awake bodies of a world after a substep of h [s]; put quiet groups to sleep."""
+def update_sleep(world, h, kept, sleep, memory, many):
+    """Update the sleep windows of all awake bodies of a world after a substep of h [s]; put quiet groups to sleep.
+
+    `kept` is None without error control (`equilibrium`). `memory` has the contacts of the last stage.
+    """
     first, is_time = world * many.bodies.state.shape[0], False
     for b in range(many.bodies.state.shape[0]):
         if is_fixed(b, many.bodies):
@@ -159,4 +163,5 @@ def update_sleep(world, h, sleep, many):
         ):
             is_time = True
     if is_time:
+        keep_unbalanced_awake(world, h, kept, sleep, memory, many)
         put_quiet_groups_to_sleep(world, sleep, many)

@@ -45,23 +45,23 @@ LONE_RELATIVE_SLOP = 1.0e-10
 
 
 @kernel
-def _step_with_halving(world, start, unit, part, shortest, switches, kept, records, many):
+def _step_with_halving(world, start, unit, lengths, switches, kept, sleep, records, many):
     """Advance the world by a part whose error is allowed: (units taken, its error, number of lengths tried).
 
-    A unit is `unit` [s]. The first length tried is `part` units; while the error is above 1, in multiples of the
-    allowed one, the length is halved, down to `shortest` units. The accepted state is that after two half steps.
+    A unit is `unit` [s]. The first length tried is `lengths[0]` units; while the error is above 1, in multiples of the
+    allowed one, the length is halved, down to `lengths[1]` units. The accepted state is that after two half steps.
     `start` is the time since the start of the call [s].
     """
-    offset_frame, tried = switches.flight.offset_frame, 1
+    (part, shortest), offset_frame, tried = lengths, switches.flight.offset_frame, 1
     save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
-    step_part(world, start, part * unit, switches, records, many)
+    step_part(world, start, part * unit, switches, sleep, records, many)
     while True:
         half = 0.5 * part * unit
         save_snapshot(SNAPSHOT_COARSE, world, kept, records.memory, records.report, many, records.counts)
         restore_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
-        step_part(world, start, half, switches, records, many)
+        step_part(world, start, half, switches, sleep, records, many)
         save_snapshot(SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts)
-        step_part(world, start + half, half, switches, records, many)
+        step_part(world, start + half, half, switches, sleep, records, many)
         error = max_body_error(offset_frame, kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
@@ -86,24 +86,25 @@ def _min_load_speed(h, many):
     return least
 
 
-def _step_coupled_part(world, place, grid, part, shortest, switches, kept, records, many):
+def _step_coupled_part(world, place, grid, lengths, switches, kept, sleep, records, many):
     now = grid[0] + place * grid[1]
-    part, error, tried = _step_with_halving(world, now, grid[1], part, shortest, switches, kept, records, many)
+    part, error, tried = _step_with_halving(world, now, grid[1], lengths, switches, kept, sleep, records, many)
     return part, following_part(place + part, part), error, tried
 
 
 @if_given("kept.rates", _step_coupled_part)
-def _step_next_part(world, place, grid, part, shortest, switches, kept, records, many):
+def _step_next_part(world, place, grid, lengths, switches, kept, sleep, records, many):
     """Advance the world by a part whose error is allowed: (units taken, next part, its error, lengths tried).
 
     It begins `place` units after the start of the substep; `grid` is the time at which that starts since the start of
-    the call, and the length of a unit [s]. The first length to try is `part` units, the last one `shortest`.
+    the call, and the length of a unit [s]. `lengths` are the first length to try and the last one, in units. A lone
+    body is awake in a part: if it sleeps, the whole world does.
     """
-    return step_lone_part(world, place, grid, part, shortest, switches, kept, records, many)
+    return step_lone_part(world, place, grid, lengths[0], lengths[1], switches, kept, records, many)
 
 
 @kernel
-def step_with_error_control(world, start, h, switches, kept, records, many):
+def step_with_error_control(world, start, h, switches, kept, sleep, records, many):
     """Advance the bodies of one world by a substep of h [s], in parts whose error is allowed.
 
     Parameters
@@ -118,6 +119,8 @@ def step_with_error_control(world, start, h, switches, kept, records, many):
         Effects that are compiled in.
     kept : WorldSnapshots
         Room for snapshots, from `allocation.make_snapshots`.
+    sleep : Sleep or None
+        None if the scene declares no sleep.
     records : Records
         Warm starts, reports and logs. The last column of `records.memory` keeps the length of the next part.
     many : BodiesWorkspace
@@ -135,7 +138,7 @@ def step_with_error_control(world, start, h, switches, kept, records, many):
     step_first_part(world, start, h, part * unit, switches, kept, records, many)
     while place < UNITS_PER_SUBSTEP:
         part, following, error, tried = _step_next_part(
-            world, place, (start, unit), part, shortest, switches, kept, records, many
+            world, place, (start, unit), (part, shortest), switches, kept, sleep, records, many
         )
         place += part
         patience -= tried

@@ -82,10 +82,10 @@ def _step_halves(world, start, half, switches, kept, records, many):
     call [s].
     """
     many.lone.impacts[0] = 0
-    step_part(world, start, half, switches, records, many)
+    step_part(world, start, half, switches, None, records, many)
     note_rates(FIRST_HALF, SNAPSHOT_START, half, kept, many)
     save_snapshot(SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts)
-    step_part(world, start + half, half, switches, records, many)
+    step_part(world, start + half, half, switches, None, records, many)
     note_rates(SECOND_HALF, SNAPSHOT_MIDDLE, half, kept, many)
     error = max_body_error(switches.flight.offset_frame, kept, many)
     if error <= 1.0 and many.lone.impacts[0] == 0:
@@ -128,7 +128,7 @@ def step_lone_part(world, place, grid, part, shortest, switches, kept, records, 
         error = _step_halves(world, start, 0.5 * part * unit, switches, kept, records, many)
         if error <= 1.0 or part <= shortest or not are_all_finite(many.bodies.state):
             following = following_part(place + part, part)
-            step_part(world, start + part * unit, following * unit, switches, records, many)
+            step_part(world, start + part * unit, following * unit, switches, None, records, many)
             note_rates(NEXT_PART, SNAPSHOT_END, following * unit, kept, many)
             hidden = _hidden_error(error, place, (part, following), unit, offset_frame, kept, many)
             stalls = stalls + 1 if hidden > _FALLING_SHARE * before else 0
@@ -154,6 +154,6 @@ def step_first_part(world, start, h, part, switches, kept, records, many):
     many.lone.suspect[0] = 0
     many.lone.substep[0] = h
     save_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
-    step_part(world, start, part, switches, records, many)
+    step_part(world, start, part, switches, None, records, many)
     save_snapshot(SNAPSHOT_COARSE, world, kept, records.memory, records.report, many, records.counts)
     restore_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)

@@ -60,12 +60,15 @@ def max_body_error(offset_frame, kept, many):
 
 
 @kernel
-def step_part(world, start, h, switches, records, many):
-    """Advance the world by one part of h [s], which starts `start` [s] after the start of the call."""
+def step_part(world, start, h, switches, sleep, records, many):
+    """Advance the world by one part of h [s], which starts `start` [s] after the start of the call.
+
+    `sleep` is None if no body of the world sleeps. Groups that wake stay awake, even if the part is undone.
+    """
     for b in range(many.bodies.state.shape[0]):
         set_clock(start, many.bodies.body[b])
         many.bodies.touched[b] = 0
-    substep_world(world, start, h, switches, None, records, many)
+    substep_world(world, start, h, switches, sleep, records, many)
 
 
 @inlined

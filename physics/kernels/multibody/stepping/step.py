@@ -95,7 +95,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         return
     for k in range(grid.steps * grid.substeps):
         if kept is not None:
-            step_with_error_control(world, k * h, h, switches, kept, records, many)
+            step_with_error_control(world, k * h, h, switches, kept, sleep, records, many)
         else:
             for b in range(bodies):
                 set_clock(k * h, many.bodies.body[b])
@@ -108,7 +108,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
             wake_world(world, bodies, sleep)
             break
         if sleep is not None:
-            update_sleep(world, h, sleep, many)
+            update_sleep(world, h, kept, sleep, memory, many)
         for b in range(bodies):
             write_state(state, world * bodies + b, read_state(many.bodies.state, b))
         if sleep is not None and is_world_asleep(world, sleep, many):
