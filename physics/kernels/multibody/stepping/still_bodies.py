@@ -1,4 +1,4 @@
-"""Still bodies: fixed ones without a prescribed motion. Their poses and boxes are computed once for a call of a step."""
+"""Still bodies: fixed ones without a prescribed motion, whose poses and boxes are computed once for a call."""
 
 from __future__ import annotations
 
