@@ -1,4 +1,4 @@
-"""A block among ten fixed boxes, here and in MuJoCo: time of a step, in turns.
+"""A block among ten fixed boxes, here and in MuJoCo: CPU time of a step, in turns.
 
 ``python -m benchmarks.fixed_boxes``: the block is thrown onto a floor of boxes, hits others and comes to rest. Both
 engines step one world, with the same boxes and step. MuJoCo reads the file that `physics.save_mjcf` makes.
@@ -40,12 +40,12 @@ class Here:
         self._start, self._step = self._world.snapshot(), physics.Stepper(self._world, 1)
 
     def run(self) -> float:
-        """Time of one run from the start [s]."""
+        """CPU time of one run from the start [s]."""
         self._world.restore(self._start)
-        begin = time.perf_counter()
+        begin = time.process_time()
         for _ in range(STEPS):
             self._step()
-        return time.perf_counter() - begin
+        return time.process_time() - begin
 
 
 class MuJoCo:
@@ -59,19 +59,19 @@ class MuJoCo:
         self._data = mujoco.MjData(self._model)
 
     def run(self) -> float:
-        """Time of one run from the start [s]."""
+        """CPU time of one run from the start [s]."""
         self._mujoco.mj_resetDataKeyframe(self._model, self._data, 0)
-        step, begin = self._mujoco.mj_step, time.perf_counter()
+        step, begin = self._mujoco.mj_step, time.process_time()
         for _ in range(STEPS):
             step(self._model, self._data)
-        return time.perf_counter() - begin
+        return time.process_time() - begin
 
 
 def main(
     runs: Annotated[int, typer.Option(min=1, help="Runs of each engine, in turns.")] = 20,
     preset: Annotated[str, typer.Option(help="Preset of this engine.")] = "balanced",
 ) -> None:
-    """Measure the median time of a step of both engines, and print their ratio."""
+    """Measure the median CPU time of a step of both engines, and print their ratio."""
     engines = {"here": Here(preset), "MuJoCo": MuJoCo()}
     for engine in engines.values():
         engine.run()

@@ -46,6 +46,27 @@ def test_every_kind_of_argument_arrives(view, on):
     np.testing.assert_array_equal(out, [1, on, -3, -1e-300, table[1, 2], shape, -2.5, 9, 0.25, -0.5, 11, 1])
 
 
+@kernel
+def unpack(out, group):
+    out[0], out[1], out[2] = group[0], group[1], group[2]
+    out[3], out[4] = group[3][0], group[3][1]
+
+
+@pytest.mark.parametrize(
+    "group",
+    [
+        (1, 2, 3, (4, 5)),
+        (True, 2, False, (4.5, True)),
+        (True, False, True, (False, True)),
+        (2.5, True, False, (3, 4.0)),
+    ],
+)
+def test_groups_arrive_whether_or_not_their_words_are_their_structure(group):
+    out = np.zeros(5)
+    bound(unpack, out, group)()
+    assert out.tolist() == [*map(float, group[:3]), *map(float, group[3])]
+
+
 def test_arrays_are_bound_not_copied_and_kept():
     out, table = np.zeros(12), np.ones((3, 3))
     call = bound(mixed, out, None, True, 1, 1.0, table, np.zeros(2, dtype=[("speed", float)]), pair_of(np.zeros(3)))

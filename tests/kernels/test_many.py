@@ -72,7 +72,7 @@ def pairs_in_the_order_of_bodies(many):
 
 
 @pytest.mark.compiled
-@pytest.mark.parametrize("count", [1, 2, 3, 10, 100, 400])
+@pytest.mark.parametrize("count", [1, 2, 3, 10, 17, 18, 100, 400])  # up to 17 each is compared with each
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 1000.0])  # of the largest to the smallest: large ones enter many columns
 @pytest.mark.parametrize("stretch", [(3, 3, 3), (30, 1, 2), (1, 40, 40)])
 def test_pairs_are_those_whose_boxes_overlap_in_the_order_of_bodies(count, ratio, stretch):

@@ -14,7 +14,7 @@ from numba.core import types
 from numba.core.datamodel.packer import ArgPacker, _flatten, _Unflattener
 
 from physics.compiler.fused.ablation import is_on
-from physics.compiler.fused.folding_builder import FoldingBuilder, StructInMemory, stack_slot
+from physics.compiler.fused.folding_builder import FoldingBuilder, StructInMemory, make_struct, stack_slot
 
 # A tuple of more words than this is passed by its address.
 FEW_WORDS = 64 if is_on("argument_passing") else sys.maxsize
@@ -35,7 +35,7 @@ class Arguments(ArgPacker):
         # Numba's own constructor would take large tuples apart, too.
         self._fe_args, self._nargs = fe_args, len(fe_args)
         self._dm_args = [_argument_model(models.lookup(each)) for each in fe_args]
-        self._addresses = [model.get_argument_type() for model in self._dm_args if isinstance(model, _ByAddress)]
+        self._addresses = [address for model in self._dm_args for address in _addresses_of(model)]
         words = [model.get_argument_type() for model in self._dm_args]
         self._unflattener = _Unflattener(words)
         self._be_args = list(_flatten(words))
@@ -54,11 +54,15 @@ _ARGUMENT_MODELS: dict[int, tuple] = {}
 
 
 def _argument_model(model):
-    """Model of an argument, cached: `_ByAddress` for a model of a large tuple, else `model` itself."""
+    """Model of an argument, cached: `_ByAddress` or `_ByMembers` for a model of a large tuple, else `model` itself."""
     known = _ARGUMENT_MODELS.get(id(model))
     if known is None:
-        known = _ARGUMENT_MODELS[id(model)] = model, _ByAddress(model) if _is_large(model) else model
+        known = _ARGUMENT_MODELS[id(model)] = model, _choose_model(model) if _is_large(model) else model
     return known[1]
+
+
+def _choose_model(model):
+    return _ByMembers(model) if isinstance(model.fe_type, types.Tuple) else _ByAddress(model)
 
 
 def _is_large(model) -> bool:
@@ -86,3 +90,31 @@ class _ByAddress:
 
     def from_argument(self, builder, address):
         return StructInMemory(address) if isinstance(builder, FoldingBuilder) else builder.load(address)
+
+
+class _ByMembers:
+    """Model of an argument for tuples without names: each member is passed as if it were an argument itself.
+
+    Such a tuple is made for a call. To pass its address, it would be written to memory first.
+    """
+
+    def __init__(self, model):
+        self._type, self.members = model.get_value_type(), [_argument_model(each) for each in model._models]
+
+    def get_argument_type(self) -> tuple:
+        return tuple(each.get_argument_type() for each in self.members)
+
+    def as_argument(self, builder, value):
+        values = (builder.extract_value(value, k) for k in range(len(self.members)))
+        return tuple(each.as_argument(builder, member) for each, member in zip(self.members, values, strict=True))
+
+    def from_argument(self, builder, words):
+        found = [each.from_argument(builder, word) for each, word in zip(self.members, words, strict=True)]
+        return make_struct(builder, self._type, found)
+
+
+def _addresses_of(model) -> list[ir.Type]:
+    """Types of the addresses among the words of an argument with this model."""
+    if isinstance(model, _ByMembers):
+        return [address for each in model.members for address in _addresses_of(each)]
+    return [model.get_argument_type()] if isinstance(model, _ByAddress) else []

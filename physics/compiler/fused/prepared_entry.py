@@ -27,13 +27,40 @@ STATUS_TYPE = ir.IntType(32)
 ENTRY_TYPE = ir.FunctionType(STATUS_TYPE, [WORD.as_pointer(), excinfo_ptr_t.as_pointer()])
 
 
+def _word_count(context, type_: types.Type) -> int:
+    """Number of words of an argument of this type. Each number takes a word of its own."""
+    if isinstance(type_, types.BaseTuple):
+        return sum(_word_count(context, member) for member in type_.types)
+    return -(-context.get_abi_sizeof(context.get_value_type(type_)) // WORD_SIZE)
+
+
+def _is_made_of_words(context, type_: types.Type) -> bool:
+    """True if the words of an argument of this type are also its LLVM structure, member by member.
+
+    Truth values differ: each has a word, but in a structure one of them may follow another after a byte.
+    """
+    if not isinstance(type_, types.BaseTuple):
+        return True
+    form, place = context.get_value_type(type_), 0
+    for k, member in enumerate(type_.types):
+        if isinstance(form, ir.ArrayType):  # of a tuple whose members are alike
+            begin = k * context.get_abi_sizeof(form.element)
+        else:
+            begin = form.get_element_offset(context.target_data, k)
+        if begin != WORD_SIZE * place or not _is_made_of_words(context, member):
+            return False
+        place += _word_count(context, member)
+    return True
+
+
 def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> tuple:
     """Read an argument of this type from the words that begin at number `place`.
 
-    Returns the LLVM value or structure, and the number of the word after it. Each number takes a word of its own.
+    Returns the LLVM value or structure, and the number of the word after it. A tuple whose words are its structure is
+    not copied: kernels read its members where they are.
     """
     form = context.get_value_type(type_)
-    if isinstance(type_, types.BaseTuple):
+    if isinstance(type_, types.BaseTuple) and not _is_made_of_words(context, type_):
         members = []
         for member in type_.types:
             value, place = _read(context, builder, words, member, place)
@@ -42,7 +69,7 @@ def _read(context, builder, words: ir.Value, type_: types.Type, place: int) -> t
     address = builder.bitcast(builder.gep(words, [word_constant(place)]), form.as_pointer())
     is_read_later = isinstance(form, ir.Aggregate) and isinstance(builder, FoldingBuilder)
     value = StructInMemory(address) if is_read_later else builder.load(address)
-    return value, place - (-context.get_abi_sizeof(form) // WORD_SIZE)
+    return value, place + _word_count(context, type_)
 
 
 def write_prepared_entry(context, library, about) -> None:

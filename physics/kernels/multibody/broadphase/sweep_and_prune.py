@@ -5,6 +5,9 @@ world axis along which the bodies' centres vary most. A body is then compared wi
 the end of its own. Only bodies in the same grid column across that axis are compared (`grid`). Pairs are returned in
 the order of their bodies' indices, so that results for two bodies do not depend on the places of others.
 
+In a world with room for all pairs, up to 2 `PAIRS_PER_BODY` + 1 bodies, each body is compared with each instead: that
+is faster than to sort so few.
+
 Reference: D. Baraff, *Dynamic simulation of non-penetrating rigid bodies*, PhD thesis, Cornell, 1992, section 2.3.
 """
 
@@ -20,7 +23,7 @@ from physics.kernels.multibody.data.capsules import half_length, is_capsule
 from physics.kernels.multibody.data.collision_groups import share_group
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 from physics.kernels.multibody.data.cylinders import cylinder_half_extent, is_cylinder
-from physics.kernels.multibody.data.fixed_bodies import may_form_pair
+from physics.kernels.multibody.data.fixed_bodies import is_still, may_form_pair
 from physics.kernels.multibody.data.parts import is_compound
 from physics.kernels.state.layout import BLOCK, HULL, POS, SPHERE, WALL_NORMAL, WALL_OFFSET
 
@@ -98,15 +101,14 @@ def half_extent(b, axis, many):
     return geo.support(shape, (d[0], d[1], d[2]), e)
 
 
-@kernel
-def write_swept_boxes(h, many):
-    """Write `many.bodies.box`: for every body a box around all its possible places within h [s], plus the slop."""
-    for b in range(many.bodies.state.shape[0]):
-        margin = surface_motion_bound(b, h, many) + many.bodies.body[b].slop
-        for axis in range(3):
-            half = half_extent(b, axis, many) + margin
-            many.bodies.box[b, axis] = many.bodies.center[b, axis] - half
-            many.bodies.box[b, axis + 3] = many.bodies.center[b, axis] + half
+@inlined
+def write_swept_box(b, h, many):
+    """Write `many.bodies.box` of body b: a box around all its possible places within h [s], plus the slop."""
+    margin = surface_motion_bound(b, h, many) + many.bodies.body[b].slop
+    for axis in range(3):
+        half = half_extent(b, axis, many) + margin
+        many.bodies.box[b, axis] = many.bodies.center[b, axis] - half
+        many.bodies.box[b, axis + 3] = many.bodies.center[b, axis] + half
 
 
 @inlined
@@ -233,13 +235,21 @@ def _sort_pairs(count, many):
     _count_into(sweep.sorted_pairs, 0, count, sweep.first_entry, sweep.pairs)
 
 
-@kernel
-def find_pairs(h, many):
-    """Find all near pairs within h [s]: write `many.broadphase.pairs` and their number `many.counts[NUM_PAIRS]`.
+@inlined
+def _compare_all(many):
+    """Write all near pairs by comparing each body with each; return their number. There must be room for all pairs."""
+    count, pairs = 0, many.broadphase.pairs
+    for a in range(many.bodies.state.shape[0]):
+        for b in range(a + 1, many.bodies.state.shape[0]):
+            if may_form_pair(a, b, many) and _overlap(a, b, many) and share_group(a, b, many):
+                pairs[count, 0], pairs[count, 1] = a, b
+                count += 1
+    return count
 
-    A near pair is two bodies a < b that may touch and whose swept boxes overlap. Pairs are sorted by a, then by b.
-    """
-    write_swept_boxes(h, many)
+
+@kernel
+def _sweep(many):
+    """Write the near pairs that sweep and prune finds; return their number."""
     axis = widest_axis(many)
     sort_bodies(axis, many)
     u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -255,4 +265,19 @@ def find_pairs(h, many):
             pairs[k, 0], pairs[k, 1] = min(a, b), max(a, b)
     if not _is_sorted(pairs, count):
         _sort_pairs(count, many)
-    many.counts[NUM_PAIRS] = count
+    return count
+
+
+@kernel
+def find_pairs(h, many):
+    """Find all near pairs within h [s]: write `many.broadphase.pairs` and their number `many.counts[NUM_PAIRS]`.
+
+    A near pair is two bodies a < b that may touch and whose swept boxes overlap. Pairs are sorted by a, then by b.
+    Bodies that are still have their boxes already (`stepping.still_bodies`).
+    """
+    count = many.bodies.state.shape[0]
+    for b in range(count):
+        if not is_still(b, many):
+            write_swept_box(b, h, many)
+    is_small = count * (count - 1) <= 2 * many.broadphase.pairs.shape[0]
+    many.counts[NUM_PAIRS] = _compare_all(many) if is_small else _sweep(many)

@@ -10,6 +10,7 @@ All of this is left out of kernels whose scene has no fixed body.
 from __future__ import annotations
 
 from physics.compiler.decorators import if_given
+from physics.kernels.multibody.data.driven_bodies import is_driven
 from physics.kernels.multibody.data.parts import body_of
 from physics.kernels.state.fixed_body import is_fixed
 
@@ -26,6 +27,16 @@ def _has_none(many):
 def has_fixed(many):
     """True if the scene has fixed bodies."""
     return True
+
+
+def _moves(b, many):
+    return False
+
+
+@if_given("many.bodies.fixed", _moves)
+def is_still(b, many):
+    """True if body b is fixed and has no prescribed motion: nothing moves it during a call of a step."""
+    return is_fixed(b, many.bodies) and not is_driven(b, many)
 
 
 @if_given("many.bodies.fixed", _same_end)

@@ -8,6 +8,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import put_vector
 from physics.kernels.multibody.data.driven_bodies import drift_driven_bodies, is_driven
+from physics.kernels.multibody.data.fixed_bodies import is_still
 from physics.kernels.multibody.data.parts import place_parts
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, principal_attitude, read_state
@@ -41,8 +42,13 @@ def update_body_pose(b, offset_frame, many):
 
 @inlined
 def update_poses_and_twists(offset_frame, many):
-    """Compute rotation, geometric centre, inverse inertia and twist of every body from its state."""
+    """Compute rotation, geometric centre, inverse inertia and twist of every body that moves from its state.
+
+    Those of all others stay as `stepping.still_bodies` has computed them.
+    """
     for b in range(many.bodies.state.shape[0]):
+        if is_still(b, many):
+            continue
         update_body_pose(b, offset_frame, many)
         put_vector(many.bodies.twist, b, 0, row_vector(many.bodies.state, b, at.LINVEL))
         q, L = read_state(many.bodies.state, b)[1], row_vector(many.bodies.state, b, at.ANGMOM)

@@ -41,6 +41,7 @@ from physics.kernels.multibody.data.capsules import capsule_support, is_capsule
 from physics.kernels.multibody.data.contact_set import add_scaled, arrival_gap, subtract
 from physics.kernels.multibody.data.cylinders import cylinder_support, is_cylinder
 from physics.kernels.multibody.data.driven_bodies import acceleration_of, spin_of, state_after
+from physics.kernels.multibody.data.fixed_bodies import is_still
 from physics.kernels.multibody.data.parts import body_of, posed_part
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, hull_support_vertex
 from physics.kernels.state.body import read_state
@@ -71,6 +72,8 @@ def write_spin_bounds(h, offset_frame, many):
         least = _MIN_TURN
     limit = 0.5 * (least / h) ** 2
     for b in range(many.bodies.state.shape[0]):
+        if is_still(b, many):
+            continue
         many.bodies.spin_bound[b] = 0.0
         w, r, push = (
             row_vector(many.bodies.twist, b, 3),

@@ -10,6 +10,7 @@ from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.data.parts import bind_parts
 from physics.kernels.multibody.narrowphase.dispatch import find_contacts
 from physics.kernels.multibody.stepping.conservative_advancement import clear_spin_bounds
+from physics.kernels.multibody.stepping.still_bodies import place_still_bodies
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import bind_body, read_state, write_state
 from physics.kernels.state.contact_law_dispatch import bind_laws
@@ -33,6 +34,7 @@ def contact_spring_energies_of_worlds(arrays, first_motion, offset_frame, shapes
             write_state(many.bodies.state, b, read_state(arrays.state, i))
             energies[i] = 0.0
         bind_parts(many)
+        place_still_bodies(offset_frame, many)
         update_poses_and_twists(offset_frame, many)
         clear_spin_bounds(many)
         find_contacts(0.0, shapes_met[0], shapes_met[1], world, None, many)

@@ -21,6 +21,7 @@ from physics.kernels.multibody.data.parts import acting_bodies, bind_parts
 from physics.kernels.multibody.data.sleeping import is_staying_asleep, is_world_asleep, update_sleep, wake_world
 from physics.kernels.multibody.data.warm_start import clear_warm_start
 from physics.kernels.multibody.stepping.adaptive_substep import step_with_error_control
+from physics.kernels.multibody.stepping.still_bodies import place_still_bodies
 from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.parallel.work_stealing import for_each_world
 from physics.kernels.state import layout as at
@@ -87,6 +88,7 @@ def advance_world(world, grid, arrays, switches, restitution, kept, sleep, recor
         many.bodies.touched[b] = 0
     bind_parts(many)
     bind_motions(params, world * bodies, many)
+    place_still_bodies(offset_frame, many)
     lost = max(find_overloaded_body(acting_bodies(many).body), find_nonfinite_body(many.bodies.state))
     if lost >= 0:
         report_fault(world, lost, report)
