@@ -59,7 +59,8 @@ def _between_row(scene, contact, many) -> Row:
             "body contact", True, f"declared; {len(scene.bodies)} bodies", f"pairs, one problem for all bodies{also}"
         )
     if contact is None:
-        return Row("body contact", False, "not declared", "")
+        pass_through = ": bodies pass through each other" if len(scene.bodies) > 1 else ""
+        return Row("body contact", False, f"not declared{pass_through}", "")
     if len(scene.bodies) == 1:
         return Row("body contact", False, "declared, but the scene has one body", "")
     why = "groups keep all bodies apart" if contact.between_bodies else "declared without contact between bodies"

@@ -50,7 +50,7 @@ EffectType = TypeVar("EffectType")
 
 
 class SceneWarning(UserWarning):
-    """Warning about a scene that is valid, but in which something has no effect, such as walls without `Contact`."""
+    """Warning about a scene that is valid, but in which something is hardly meant, such as walls without `Contact`."""
 
 
 @known_keywords
@@ -196,9 +196,9 @@ class Scene:
         for k, sensor in enumerate(self.sensors):
             carrier_index(sensor, self.bodies, f"Scene.sensors[{k}]")
         if self.walls and contact is None:
-            warnings.warn(NO_CONTACT, SceneWarning, stacklevel=_frames_of_package())
+            warnings.warn(NO_CONTACT, SceneWarning, stacklevel=frames_of_package())
         if contact is None and any(body.fixed for body in self.bodies):
-            warnings.warn(FIXED_WITHOUT_CONTACT, SceneWarning, stacklevel=_frames_of_package())
+            warnings.warn(FIXED_WITHOUT_CONTACT, SceneWarning, stacklevel=frames_of_package())
 
     def __repr__(self) -> str:
         return self._expression() or parts_repr(self)
@@ -292,7 +292,7 @@ def _items(given: Any, name: str, allowed: Any) -> tuple:
     return items
 
 
-def _frames_of_package() -> int:
+def frames_of_package() -> int:
     """`stacklevel` with which a warning of the caller names the line outside this package that called into it."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] in ("physics", "dataclasses"):

@@ -36,6 +36,7 @@ from physics.world.report import StepReport
 from physics.world.scene_settings import scene_settings
 from physics.world.set_once import with_attributes_set_once
 from physics.world.snapshot import Snapshot
+from physics.world.step_length import warn_of_long_steps
 from physics.world.stepper import kernel_calls, retime
 from physics.world.touching import Touching
 
@@ -103,6 +104,8 @@ class World(Touching, Querying):
         self.time = 0.0
         self.recorder = self.impacts = None
         batch_arrays.check_room(self.worlds, self.body_count, self.plan)
+        if self.plan.contact:
+            warn_of_long_steps(scene, self.dt)
         self._allocate()
         batch_arrays.fill(self)
         setters.check_place(self, self.state, self.params, np.arange(self.worlds), "scene")

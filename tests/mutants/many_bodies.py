@@ -527,6 +527,14 @@ DRIVEN = [
         _MOTION + "a_block_drifts_on_a_shaker",
     ),
     _mutant(
+        "slip-end",
+        "Under error control a stage does not end where a slip ends.",
+        "stepping/slip_end.py",
+        "return many.settings[0].is_error_controlled == 1 or _is_on_driven(k, many)",
+        "return _is_on_driven(k, many)",
+        "physics/test_refine.py::test_a_block_stops_on_a_slab_where_it_must",
+    ),
+    _mutant(
         "driven-surface",
         "A moving surface pushes along the normal of a contact.",
         "data/driven_bodies.py",

@@ -134,18 +134,27 @@ def test_a_hull_slides_off_the_end_of_a_ramp():
 
 @pytest.mark.interpreted
 @pytest.mark.parametrize(
-    ("preset", "steps", "bound"),
-    sweep([("balanced", 183, 2e-4), ("balanced", 732, 1e-5), ("precise", 183, 1e-9)], [("balanced", 183, 2e-4)]),
+    ("preset", "dt", "bound"),
+    sweep(
+        [("balanced", 0.005, 1e-4), ("balanced", 0.00125, 1e-5), ("precise", 0.005, 1e-9)], [("balanced", 0.005, 1e-4)]
+    ),
 )
-def test_a_ball_leaves_a_ball(preset, steps, bound):
-    """Place 0.3 s after it has left, with steps of 5 ms and of a quarter: an error of second order."""
-    true = BallOnBall()
-    time = true.leaving[0] + 0.3
-    start = true.radius * np.array([math.sin(true.start), math.cos(true.start), 0.0])
-    balls = [physics.Sphere(1.0, fixed=True), physics.Sphere(true.radius - 1.0, 0.7, pos=start)]
-    world = physics.World(physics.Scene(balls, effects=[PULL, physics.Contact()]), dt=time / steps, accuracy=preset)
+@pytest.mark.parametrize("start", sweep([0.02, 0.1, 0.2, 0.3, 0.304, 0.316, 0.328, 0.34, 0.5], [0.3, 0.316, 0.328]))
+def test_a_ball_leaves_a_ball(start, preset, dt, bound):
+    """Place 0.3 s after it has left, wherever in a step of 5 ms it leaves, and with a quarter of the step.
+
+    The push of the lower ball falls by c = 3 g sin θ θ' < 53 m/s³. A stage acts at its middle, so that the one in which
+    the push ends misses up to c dt²/8 = 1.7e-4 m/s: 5e-5 m after 0.3 s. The way before is an error of second order. It
+    was measured: 3e-5 m at the most. Both are 16 times less with a quarter of the step.
+    """
+    true = BallOnBall(start=start)
+    steps = round((true.leaving[0] + 0.3) / dt)
+    place = true.radius * np.array([math.sin(true.start), math.cos(true.start), 0.0])
+    balls = [physics.Sphere(1.0, fixed=True), physics.Sphere(true.radius - 1.0, 0.7, pos=place)]
+    world = physics.World(physics.Scene(balls, effects=[PULL, physics.Contact()]), dt=dt, accuracy=preset)
     world.step(steps=steps)
-    np.testing.assert_allclose(world.pos[0, 1], [*true.place_after_leaving(0.3), 0.0], atol=bound)
+    expected = true.place_after_leaving(steps * dt - true.leaving[0])
+    np.testing.assert_allclose(world.pos[0, 1], [*expected, 0.0], atol=bound)
 
 
 @pytest.mark.parametrize("dt", [0.001, 0.005, 0.02])

@@ -217,3 +217,20 @@ def test_states_that_are_too_large_are_reported(name, count, accuracy):
         assert world.state[:, : at.ANGVEL].tobytes() == before
         world.set_state(**{name: getattr(physics.World(blocks(count, 50.0)), name)})
         assert world.step().status[0] == Status.OK
+
+
+def test_a_step_in_which_gravity_moves_a_body_by_many_radii_warns():
+    """Block of radius √(25 + 9 + 4)/2 m = 3.1 m: ½ g t² is 100 radii at 7.9 s. Free flight is exact at any step."""
+    scene = physics.scenes.drop()
+    with pytest.warns(physics.SceneWarning, match=r"dt is 10.0 s: gravity moves a body 49\d m .*; in 0.79 s it falls"):
+        physics.World(scene, dt=10.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        physics.World(scene, dt=1.0)
+        physics.World(physics.Scene(scene.bodies, effects=[physics.Gravity()]), dt=1e3)
+
+
+def test_explain_says_that_bodies_pass_through_each_other():
+    balls = [physics.Sphere(1.0, 1.0), physics.Sphere(1.0, 1.0, pos=(3, 0, 0))]
+    assert "not declared: bodies pass through each other" in physics.World(physics.Scene(balls)).plan.explain()
+    assert "pass through" not in physics.World(physics.Scene(balls[:1])).plan.explain()

@@ -176,6 +176,8 @@ def make_bodies_workspace(
         Axes of friction with two coefficients; None: it has one coefficient.
     lone : True or None
         Whether exactly one body moves, and it can touch fixed bodies.
+    slip_ends : bool
+        Whether stages end where slips end (`stepping.slip_end`).
     settings : float
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
@@ -199,6 +201,7 @@ def make_bodies_workspace(
         walls=walls.copy(),
         materials=materials[1],
         driven=_make_driven(bodies, contacts, motion_columns),
+        stage_start=_make_stage_start(bodies, contacts) if settings.pop("slip_ends", None) else None,
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
         grain=settings.pop("grain", None),
@@ -358,8 +361,11 @@ def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | Non
         clock=np.zeros(2),
         velocity=np.zeros((contacts, 3)),
         target=np.zeros((contacts, 3)),
-        start=StageStart(np.zeros((bodies, STATE_SIZE)), np.zeros((contacts, 3)), np.zeros((contacts, 3))),
     )
+
+
+def _make_stage_start(bodies: int, contacts: int) -> StageStart:
+    return StageStart(np.zeros((bodies, STATE_SIZE)), np.zeros((contacts, 3)), np.zeros((contacts, 3)))
 
 
 def _make_lone(contacts: int) -> LoneBody:

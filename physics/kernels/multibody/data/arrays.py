@@ -257,7 +257,6 @@ class DrivenBodies(NamedTuple):
     clock: np.ndarray  # (2,) time of the world at the start of the call, and now [s]
     velocity: np.ndarray  # (contacts, 3) velocity of the second end, world frame; 0 unless it is driven [m/s]
     target: np.ndarray  # (contacts, 3) during a solve: targets relative to the driven ends [m/s]
-    start: StageStart
 
 
 class LoneBody(NamedTuple):
@@ -323,6 +322,7 @@ class BodiesWorkspace(NamedTuple):
     walls: np.ndarray  # (walls, WALL_SIZE) columns of `state.layout`
     materials: PairMaterials | None  # None: the default rules, and no exceptions
     driven: DrivenBodies | None  # None: the scene declares no motion
+    stage_start: StageStart | None  # None: stages do not end where slips end
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
     resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
     grain: Grain | None  # None: the scene has no friction with two coefficients

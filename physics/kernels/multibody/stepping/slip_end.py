@@ -1,8 +1,10 @@
-"""End of a stage where a slip on a driven body ends: there friction may turn round, or begin to hold.
+"""End of a stage where a slip ends: there friction begins to hold, or turns round.
 
 Friction of a stage opposes the slip at its end (`midpoint_step`). If a slip ends within the stage, this is an error of
 first order in the velocity. On a body that stands it happens once, and the block stays. On a driven body it may happen
-in every period of the motion, and the errors add up. So the stage is then made again, up to the end of the slip.
+in every period of the motion, and the errors add up. Under error control, parts must be short there. So the stage is
+then made again, up to the end of the slip: on driven bodies, and under error control of several moving bodies. (Those
+of a lone body are met by `lone_part`.)
 
 Let s₀ > 0 be the slip of a pair before the stage of length h, along its own direction e, and s₁ that after it. Without
 impulses it would be s. All contacts of the pair together use the share r = Σ p_t·e / Σ μ p_n of their friction. So
@@ -11,7 +13,7 @@ nearly constant. So the slip ends at the time
 
     h s₀ / (s₀ - s + F).
 
-All of this is left out of kernels whose scene has no body with a motion.
+All of this is left out of other kernels.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import minus, row_vector, times
 from physics.kernels.multibody.data.contact_set import end_of_pair, relative_velocity, slip_velocity
-from physics.kernels.multibody.data.driven_bodies import bind_driven_twists, is_driven
+from physics.kernels.multibody.data.driven_bodies import bind_driven_twists, driven_velocity, is_driven
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
 from physics.kernels.multibody.stepping.midpoint_step import midpoint_step
@@ -42,10 +44,24 @@ _LAST_SHARE = 1.0 - 1.0e-6
 _FIRST_TOLERANCES = 100.0
 
 
-@inlined
+def _never(k, many):
+    return False
+
+
+@if_given("many.driven", _never)
 def _is_on_driven(k, many):
     b = -1 - many.walls.shape[0] - many.contacts.bodies[k, 1]
     return b >= 0 and is_driven(b, many)
+
+
+def _is_controlled(k, many):
+    return many.settings[0].is_error_controlled == 1 or _is_on_driven(k, many)
+
+
+@if_given("many.lone", _is_controlled)
+def _is_followed(k, many):
+    """True if a stage ends where the slip of contact k's pair ends."""
+    return _is_on_driven(k, many)
 
 
 @inlined
@@ -71,7 +87,7 @@ def _was_slipping(first, last, e, many):
 @inlined
 def _save_start(n, world, h, friction, memory, many):
     """Save states, targets and slips of the n contacts before a stage; load the impulses of the stage before."""
-    kept = many.driven.start
+    kept = many.stage_start
     load_warm_impulses(n, world, h, friction, memory, many)
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
@@ -86,7 +102,7 @@ def _save_start(n, world, h, friction, memory, many):
         last = end_of_pair(k, n, many)
         slip = row_vector(kept.slip, k, 0)
         size = math.sqrt(qt.dot(slip, slip))
-        if not (_is_on_driven(k, many) and size > 0.0 and _was_slipping(k, last, times(1.0 / size, slip), many)):
+        if not (_is_followed(k, many) and size > 0.0 and _was_slipping(k, last, times(1.0 / size, slip), many)):
             for c in range(3):
                 kept.slip[k, c] = 0.0  # of the first contact, which stands for its pair
         k = last
@@ -95,7 +111,7 @@ def _save_start(n, world, h, friction, memory, many):
 @inlined
 def _restore_start(n, start, h, offset_frame, many):
     """Restore what `_save_start` has saved, for a stage of length h [s] that begins `start` [s] into the call."""
-    kept = many.driven.start
+    kept = many.stage_start
     for b in range(many.bodies.state.shape[0]):
         for c in range(many.bodies.state.shape[1]):
             many.bodies.state[b, c] = kept.state[b, c]
@@ -110,9 +126,9 @@ def _restore_start(n, start, h, offset_frame, many):
 def _end_of_slip(first, last, h, many):
     """Time at which the pair of the contacts [first, last) stops slipping in the stage of length h, else h [s].
 
-    A saved slip of 0 is that of a pair that holds, or of one without a driven body.
+    A saved slip of 0 is that of a pair that holds, or of one that is not followed.
     """
-    slip = row_vector(many.driven.start.slip, first, 0)
+    slip = row_vector(many.stage_start.slip, first, 0)
     before = math.sqrt(qt.dot(slip, slip))
     if not before > 0.0:
         return h
@@ -120,7 +136,7 @@ def _end_of_slip(first, last, h, many):
     share = _share_of_friction(first, last, e, many)
     if share <= -_FULL_SHARE:
         return h
-    w = row_vector(many.driven.velocity, first, 0)
+    w = driven_velocity(first, many)
     after = qt.dot(e, minus(relative_velocity(first, many.bodies.twist, many), w))
     free = qt.dot(e, minus(relative_velocity(first, many.bodies.free_twist, many), w))
     if abs(share) < _LEAST_SHARE:
@@ -131,7 +147,7 @@ def _end_of_slip(first, last, h, many):
 
 @kernel
 def _first_end_of_slip(n, h, many):
-    """Time at which the first pair with a driven body stops slipping in the stage of length h, else h [s]."""
+    """Time at which the first pair that is followed stops slipping in the stage of length h, else h [s]."""
     first, k, least = h, 0, _FIRST_TOLERANCES * many.settings[0].tolerance
     while k < n:
         last = end_of_pair(k, n, many)
@@ -147,9 +163,9 @@ def _whole_stage(n, world, start, h, is_last, switches, sleep, records, many):
     return h
 
 
-@if_given("many.driven", _whole_stage)
+@if_given("many.stage_start", _whole_stage)
 def step_to_slip_end(n, world, start, h, is_last, switches, sleep, records, many):
-    """Advance every body by h [s], or to the end of a slip on a driven body; return the length of the stage [s].
+    """Advance every body by h [s], or to the end of a slip that is followed; return the length of the stage [s].
 
     `start` is the time since the start of the call [s]. The last stage of a substep (`is_last`) is not cut. The other
     arguments are those of `midpoint_step`.

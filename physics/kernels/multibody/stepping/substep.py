@@ -53,6 +53,9 @@ from physics.kernels.state.groups import flies_exactly
 # or three cuts lead up to one.
 SPLITS_PER_IMPACT = 4
 
+# Largest number of stages of a substep that end with a slip, per body. A pile may rattle between holding and slipping.
+SLIP_ENDS_PER_BODY = 2
+
 # Depth from which bodies that a user placed count as overlapping, as a share of the smaller one's bounding radius. The
 # same depth in a wall is refused (`physics.world.setters.START_DEPTH`).
 OVERLAP_SHARE = 1.0e-2
@@ -104,7 +107,7 @@ def substep_world(
     `start` is the time since the start of the call [s], `world` the index of the world. For the other arguments see
     `step.advance_world`.
     """
-    left, impacts, cuts, turns = h, 0, 0, 0
+    left, impacts, cuts, turns, stops = h, 0, 0, 0, 0
     many.settings[0].substep = h
     while True:
         is_last = impacts >= many.settings[0].splits or cuts == SPLITS_PER_IMPACT * many.settings[0].splits
@@ -145,7 +148,10 @@ def substep_world(
         if t < left:
             records.report[world, at.SPLITS] += 1.0
         t = stage_to_rim(n, world, t, is_last, records.memory, many)
-        t = step_to_slip_end(n, world, start + (h - left), t, is_last, switches, sleep, records, many)
+        first, is_whole = t, is_last or stops == SLIP_ENDS_PER_BODY * many.bodies.state.shape[0]
+        t = step_to_slip_end(n, world, start + (h - left), t, is_whole, switches, sleep, records, many)
+        if t < first:
+            stops += 1
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.body[b])
