@@ -9,7 +9,7 @@ import pytest
 
 import physics
 from physics.accuracy import PRESETS
-from physics.kernels.multibody.stepping.part import ERROR_PER_TOLERANCE
+from physics.kernels.multibody.stepping.allowed_error import ERROR_PER_TOLERANCE
 
 G = 9.81
 FLOOR = physics.HalfSpace((0, 1, 0))

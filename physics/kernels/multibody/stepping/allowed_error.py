@@ -6,13 +6,13 @@ from physics.compiler.decorators import inlined
 
 # In tolerances of the contact problem. The residual of a solve changes velocities by a few tolerances, however short
 # the part is.
-_ERROR_PER_TOLERANCE = 100.0
+ERROR_PER_TOLERANCE = 100.0
 
 
 @inlined
 def allowed_error(many):
     """Error that a part may have, as a share of a body's size and speed."""
-    return _ERROR_PER_TOLERANCE * many.settings[0].tolerance
+    return ERROR_PER_TOLERANCE * many.settings[0].tolerance
 
 
 @inlined

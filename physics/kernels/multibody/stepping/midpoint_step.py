@@ -171,8 +171,8 @@ def _turning(k, b, h, many):
     exchange_twists(many.contacts.bodies[k, 0], 0, many)
     t = (t[0] - half * _turn_of_line(one, other, many), t[1], t[2])
     t = less_turn_of_axes(k, one, other, half, t, many)
-    t = less_turn_beside_cylinder(k, one, other, half, t, many)
     exchange_twists(many.contacts.bodies[k, 0], 0, many)
+    t = less_turn_beside_cylinder(k, one, other, half, t, many)
     if many.settings[0].is_error_controlled == 1 or has_fixed(many):
         t = (t[0] + h * _coriolis(k, many), t[1], t[2])
     return t
