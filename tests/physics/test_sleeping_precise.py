@@ -12,7 +12,7 @@ import pytest
 import physics
 from physics import scenes
 from physics.accuracy import resolve
-from tests.physics.test_sleeping import BLOCK, DT, MU, RADIUS, STEPS, WEIGHT, G, force, on_edge, sleeping
+from tests.physics.test_sleeping import BLOCK, CHANGES, DT, MU, RADIUS, STEPS, WEIGHT, G, force, on_edge, sleeping
 from tests.tiers.sweep import sweep
 
 pytestmark = pytest.mark.interpreted
@@ -158,15 +158,7 @@ def test_from_a_small_offset_a_cube_falls_off_its_edge_as_if_it_never_slept():
 # --- waking ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("change", "speed"),
-    [
-        (lambda world: world.set_state(linvel=[[[1, 0, 0]]]), 1 - MU * G * DT),
-        (lambda world: world.set_parameters(gravity=(0.5 * G, -G, 0)), (0.5 - MU) * G * DT),
-        (lambda world: world.set_parameters(mass=2.0), 0.0),
-        (lambda world: world.set_parameters(friction=0.1), 0.0),
-    ],
-)
+@pytest.mark.parametrize(("change", "speed"), CHANGES)
 def test_a_change_from_outside_wakes_it(change, speed):
     world = asleep_world()
     change(world)
