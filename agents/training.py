@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import torch
 from rich.console import Console
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import Logger, configure
 
-from agents.algorithms import make_model, make_training_env
+from agents.algorithms import make_model, make_training_env, set_up_torch
 from agents.checkpoint import greedy, list_checkpoints, load_checkpoint
 from agents.config import RunConfig, RunFolder
 from agents.curve import History, plot_curve, write_curve
@@ -61,7 +60,7 @@ def train(
         If a resumed run has no checkpoint, or the algorithm or the environment refuses an argument.
     """
     console = console or make_console()
-    torch.set_num_threads(config.torch_threads)
+    set_up_torch(config)
     if is_resumed:
         model, history = load_checkpoint(run, config)
     else:

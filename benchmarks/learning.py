@@ -22,12 +22,11 @@ from typing import Annotated, Any
 
 import gymnasium as gym
 import numpy as np
-import torch
 import typer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv
 
-from agents.algorithms import make_model, make_training_env
+from agents.algorithms import make_model, make_training_env, set_up_torch
 from agents.config import RunConfig, make_config
 from agents.curve import WINDOW
 from benchmarks import machine
@@ -110,7 +109,7 @@ def run(config: RunConfig, make_envs: Callable[[RunConfig], Any], rate: float) -
     rate : float
         Success rate at which training ends.
     """
-    torch.set_num_threads(config.torch_threads)
+    set_up_torch(config)
     envs, watch = make_envs(config), Watch(rate)
     try:
         make_model(config, envs).learn(config.max_steps, callback=watch)
