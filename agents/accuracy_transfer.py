@@ -20,8 +20,10 @@ from rich.console import Console
 from agents.checkpoint import load_policy
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
 from agents.curve import plot_transfer
-from agents.evaluate import JsonOption, evaluate, write_json
-from agents.train import DEFAULTS, INTERRUPTED, Interrupted, train
+from agents.evaluate import evaluate
+from agents.options import JsonOption, write_json
+from agents.train import DEFAULTS, INTERRUPTED
+from agents.training import Interrupted, train
 from physics.accuracy import PRESETS
 from rigid_env.cli.files import PLOTS, output_option
 from rigid_env.lab.measure import machine

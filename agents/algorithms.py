@@ -1,4 +1,4 @@
-"""Make environments and models of Stable-Baselines3 from the configuration of a run."""
+"""Make the batch and the model of Stable-Baselines3 from the configuration of a run."""
 
 from __future__ import annotations
 
@@ -10,20 +10,15 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import torch
-from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO, SAC, HerReplayBuffer
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import OrnsteinUhlenbeckActionNoise
 
-import physics
 from agents.config import RunConfig
+from agents.environments import make_training_batch
 from agents.features import GoalDifference
 from physics.keywords import nearest_first
 from rigid_env import RigidVecEnv
-from rigid_env.envs.named import not_there
-
-# Text in the errors of Python and of `physics.keywords` for an unknown argument.
-UNKNOWN_ARGUMENT = "unexpected keyword argument"
 
 CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 
@@ -31,57 +26,9 @@ CLASSES: dict[str, type[BaseAlgorithm]] = {"ppo": PPO, "sac": SAC}
 PPO_ADAM = {"eps": 1e-5, "foreach": True}
 
 
-def make_single_env(env: str, **arguments: Any) -> gym.Env:
-    """Make a single environment; arguments as of `make_vector_env`, without `num_envs`."""
-    return _make(gym.make, env, arguments)
-
-
-def make_vector_env(env: str, num_envs: int, **arguments: Any) -> gym.vector.VectorEnv:
-    """Make the native batch of an environment.
-
-    Parameters
-    ----------
-    env : str
-        Gymnasium id.
-    num_envs : int
-        Number of worlds.
-    **arguments
-        Arguments of the environment, with `autoreset_mode` and `threads`. `accuracy` may also be a dict with the fields
-        of a `physics.Accuracy`.
-
-    Raises
-    ------
-    ValueError
-        If there is no such environment, or an argument is out of range.
-    """
-    native = {"num_envs": num_envs, "vectorization_mode": "vector_entry_point"}
-    return _make(gym.make_vec, env, {**native, **arguments})
-
-
-def _make(maker: Callable[..., Any], env: str, arguments: dict[str, Any]) -> Any:
-    if isinstance(arguments.get("accuracy"), dict):
-        arguments = {**arguments, "accuracy": physics.Accuracy(**arguments["accuracy"])}
-    try:
-        return maker(env, **arguments)
-    except gym.error.UnregisteredEnv as error:
-        raise not_there(env) from error
-    except TypeError as error:
-        if UNKNOWN_ARGUMENT in str(error):
-            raise ValueError(f"env_kwargs: {error}") from error
-        raise
-
-
 def make_training_env(config: RunConfig) -> RigidVecEnv:
     """Make the batch that a run trains on; world i draws its episodes from the seed `config.seed` + i."""
-    vector_env = make_vector_env(
-        config.env,
-        config.num_envs,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-        threads=config.threads,
-        accuracy=config.accuracy,
-        **config.env_kwargs,
-    )
-    env = RigidVecEnv(vector_env)
+    env = RigidVecEnv(make_training_batch(config))
     env.seed(config.seed)
     return env
 

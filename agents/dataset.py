@@ -11,7 +11,8 @@ import typer
 from gymnasium.error import DependencyNotInstalled
 
 from agents.baselines import Policy, baseline_policy
-from agents.evaluate import AccuracyOption, SeedOption, evaluation_seeds
+from agents.evaluate import evaluation_seeds
+from agents.options import AccuracyOption, SeedOption
 from rigid_env.envs.policy_files import act, load_policy
 from rigid_env.envs.pretrained import PRETRAINED, pretrained_path
 from rigid_env.extras import require

@@ -6,7 +6,6 @@ would favour short ones, which are successes.
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,28 +16,18 @@ import typer
 from gymnasium.vector import AutoresetMode
 from rich.console import Console
 
-from agents.algorithms import make_vector_env
 from agents.baselines import Policy, baseline_policy
 from agents.checkpoint import load_policy
 from agents.config import RunFolder
+from agents.environments import make_vector_env
 from agents.interval import wilson
-from rigid_env.cli.files import output_option
-from rigid_env.cli.names import checked_preset
+from agents.options import AccuracyOption, BaselineOption, EnvOption, JsonOption, RunArgument, SeedOption, write_json
 from rigid_env.terminal import Column, Table, make_console, run_program
 
 BATCH = 500  # episodes at a time
 
 FIRST_SEED = 1_000_000_000  # far from the seeds of training, which start at the seed of the run
 SEED_STRIDE = 1_000_000  # difference of the first seeds of two evaluations
-
-# --- options of the command lines -------------------------------------------------------------------------
-RUN_HELP = "Folder of a run; code in its model.zip runs while it is read: take it from those you trust only."
-RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help=RUN_HELP)]
-BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
-EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
-SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
-AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.", callback=checked_preset)]
-JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 
 
 @dataclass(frozen=True)
@@ -160,12 +149,6 @@ def evaluate(env: str, policy: Policy, episodes: int, seed: int, **arguments: An
     done = run_episodes(env, policy, evaluation_seeds(seed, episodes), **arguments)
     seconds = time.perf_counter() - start
     return {"env": env, **arguments, "seed": seed, **done.summary(), "seconds": round(seconds, 3)}
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a dict as JSON; makes a missing folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 def make_table(result: dict[str, Any], title: str) -> Table:

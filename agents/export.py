@@ -13,8 +13,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.checkpoint import load_trained
 from agents.config import RunFolder
-from agents.evaluate import RUN_HELP
 from agents.features import FINE, GoalDifference
+from agents.options import RUN_HELP
 from rigid_env.cli.files import checked, make_parents
 from rigid_env.envs.policy_files import ARRAYS, Network
 from rigid_env.terminal import make_console, run_program

@@ -10,18 +10,11 @@ import gymnasium as gym
 import numpy as np
 import typer
 
-from agents.algorithms import make_single_env
 from agents.baselines import Policy
 from agents.config import RunFolder
-from agents.evaluate import (
-    AccuracyOption,
-    BaselineOption,
-    EnvOption,
-    RunArgument,
-    SeedOption,
-    choose_subject,
-    evaluation_seeds,
-)
+from agents.environments import make_single_env
+from agents.evaluate import choose_subject, evaluation_seeds
+from agents.options import AccuracyOption, BaselineOption, EnvOption, RunArgument, SeedOption
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_camera
 from rigid_env.envs.policy_files import act
 from rigid_env.terminal import make_console, run_program

@@ -12,7 +12,8 @@ from rich.console import Console
 
 from agents.checkpoint import list_checkpoints
 from agents.config import CHANGEABLE, RunConfig, RunFolder
-from agents.evaluate import evaluate, evaluation_seeds, print_evaluation, write_json
+from agents.evaluate import evaluate, evaluation_seeds, print_evaluation
+from agents.options import write_json
 from agents.record import record
 from agents.supervisor import OnCheckpoint
 from agents.training import train

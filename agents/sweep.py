@@ -17,9 +17,10 @@ from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 
 from agents import asha
-from agents.algorithms import algorithm_arguments, make_vector_env
+from agents.algorithms import algorithm_arguments
 from agents.config import HYPERPARAMETERS, RunFolder
-from agents.evaluate import write_json
+from agents.environments import make_vector_env
+from agents.options import write_json
 from agents.run import read_result
 from agents.trials import Trial, make_trials, parse_grid, parse_seeds
 from agents.worker import make_job

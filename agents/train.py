@@ -19,20 +19,27 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.console import Console
 
+from agents.compile_ahead import compile_ahead
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, default_algorithm, make_config, make_folder
-from agents.evaluate import JsonOption, write_json
-from agents.run import check_same, read_result, run_or_resume
+from agents.options import JsonOption, write_json
 from agents.settings import apply_settings, parse_settings
-from agents.training import Interrupted, train
 from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import make_console, run_program
-
-__all__ = ["Interrupted", "main", "run_or_resume", "train"]
 
 DEFAULTS = {"env": "rigid_env/BlockReach-v0", "seed": 0}
 RESUME_HELP = "Go on with a run; code in its checkpoint runs while it is read: take it from those you trust only."
 INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
+
+
+def __getattr__(name: str) -> Any:
+    """Import `run_or_resume`, and PyTorch with it, when it is asked for."""
+    if name == "run_or_resume":
+        from agents.run import run_or_resume
+
+        return run_or_resume
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, Any]) -> RunConfig:
@@ -59,6 +66,27 @@ def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, A
     if given:
         raise ValueError(f"{next(iter(given))} cannot change with --resume; allowed are target, max_steps, threads")
     return RunFolder(resume).read_config()
+
+
+def _run(config: RunConfig, run: RunFolder, with_video: bool, with_tensorboard: bool, console: Console) -> dict:
+    """Run, or go on with, a run and return its result; imports PyTorch."""
+    from agents.run import check_same, read_result, run_or_resume
+    from agents.training import Interrupted
+
+    console.print(f"run         {run.path}", soft_wrap=True)
+    try:
+        if run.config.is_file():
+            check_same(run, config)
+        if read_result(run, config) is not None:
+            console.print("This run is complete: a larger --max-steps or --target trains on.")
+        return run_or_resume(
+            config, run.path, with_video=with_video, with_tensorboard=with_tensorboard, console=console
+        )
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    except Interrupted as interruption:
+        console.print(str(interruption), soft_wrap=True)
+        raise typer.Exit(INTERRUPTED) from interruption
 
 
 def main(
@@ -103,19 +131,12 @@ def main(
         config = apply_settings(config, chosen)
         if resume is not None and folder is not None:
             raise ValueError(f"--folder is {str(folder)!r}, with --resume; allowed is one of them")
-        given = resume or folder
-        run = make_folder(out, config) if given is None else RunFolder(given)
-        console.print(f"run         {run.path}", soft_wrap=True)
-        if run.config.is_file():
-            check_same(run, config)
-        if read_result(run, config) is not None:
-            console.print("This run is complete: a larger --max-steps or --target trains on.")
-        result = run_or_resume(config, run.path, with_video=video, with_tensorboard=tensorboard, console=console)
+        compile_ahead(config)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
-    except Interrupted as interruption:
-        console.print(str(interruption), soft_wrap=True)
-        raise typer.Exit(INTERRUPTED) from interruption
+
+    run = make_folder(out, config) if resume is None and folder is None else RunFolder(resume or folder)
+    result = _run(config, run, video, tensorboard, console)
     if json_file is not None:
         write_json(json_file, result)
     for name, path in (("curve", run.curve.with_suffix(".png")), ("evaluation", run.evaluation), ("policy", run.model)):

@@ -10,8 +10,8 @@ from typing import Any
 
 from rich.console import Console
 
-from agents.algorithms import make_training_env
 from agents.config import RunConfig, RunInUse
+from agents.environments import warm_kernels
 from agents.run import run_or_resume
 from agents.supervisor import OnCheckpoint
 from agents.training import Interrupted
@@ -55,10 +55,3 @@ def run_trial(
             time.sleep(0.2)
         except Interrupted as error:
             raise KeyboardInterrupt(str(error)) from error
-
-
-def warm_kernels(config: RunConfig) -> None:
-    """Compile or load the kernels of a run's environment."""
-    env = make_training_env(config)
-    env.reset()
-    env.close()

@@ -44,6 +44,12 @@ def _logs(tmp_path_factory):
     os.environ.setdefault("SB3_LOGDIR", str(tmp_path_factory.mktemp("sb3")))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _no_second_process():
+    """Leave compilation to the one process of a test, whose kernels the tests before have compiled."""
+    os.environ.setdefault("RIGID_ENV_COMPILE_AHEAD", "0")
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """A seeded generator."""

@@ -103,6 +103,7 @@ class Painter:
         _, self._canvas = self._surface((SUPERSAMPLING * size[0], SUPERSAMPLING * size[1]), "RGBX")
         self._shadows = ShadowLayer(size, self._pygame)
         self._settings = OrderedDict()
+        self._backdrop = (None, None)  # key and pixels of the last one without a goal
 
     def _surface(self, size, layout):
         """Make an array (height, width, 4) uint8, and a surface on the same memory.
@@ -143,10 +144,14 @@ class Painter:
         return setting
 
     def _key(self, frame):
+        goal = frame.goal
+        place = goal and (goal.pos is not None and (*goal.pos.tolist(), goal.radius, goal.reached))
+        return *self._room_key(frame), place
+
+    def _room_key(self, frame):
         walls = tuple((*wall.normal.tolist(), wall.offset) for wall in frame.walls)
         shapes = () if self._room else tuple((body.kind, *body.dimensions.tolist()) for body in frame.bodies)
-        goal = frame.goal
-        return walls, shapes, goal and (goal.pos is not None and (*goal.pos.tolist(), goal.radius, goal.reached))
+        return walls, shapes
 
     def _make_setting(self, frame):
         if self._room:
@@ -154,7 +159,9 @@ class Painter:
         else:
             room = make_room(frame.walls, frame.bodies, self._bounds)
         camera = self._camera or default_camera(room, self.size)
-        self._memory[..., :3] = draw_backdrop(camera, self.size, room)
+        if self._backdrop[0] != self._room_key(frame):
+            self._backdrop = self._room_key(frame), draw_backdrop(camera, self.size, room)
+        self._memory[..., :3] = self._backdrop[1]
         canvas = self._enlarged(camera)
         draw_far_outlines(canvas, room)
         draw_goal(canvas, frame.goal, room)

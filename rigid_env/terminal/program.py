@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 
 import typer
@@ -11,7 +12,11 @@ def run_program(main: Callable) -> None:
     """Run a function as a program: its parameters become the options of the command line, its docstring the help text.
 
     As in the command line `rigid-env` there is no markup: square brackets are printed, and an error is one line.
+    Objects are left to the system in the end: Python would look through all of them, PyTorch's for a second.
     """
     app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     app.command()(main)
-    app()
+    try:
+        app()
+    finally:
+        gc.freeze()

@@ -12,7 +12,7 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3 import PPO, SAC
 
 from agents import export
-from agents.algorithms import make_vector_env
+from agents.environments import make_vector_env
 from agents.export import network_of
 from agents.features import GoalDifference
 from rigid_env import RigidVecEnv, load_policy

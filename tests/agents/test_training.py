@@ -14,12 +14,12 @@ pytest.importorskip("stable_baselines3")
 
 import torch
 
-from agents.algorithms import make_vector_env
 from agents.checkpoint import KEPT, list_checkpoints, load_checkpoint, load_policy
 from agents.config import RunFolder, change, make_config
+from agents.environments import make_vector_env
 from agents.evaluate import run_episodes
 from agents.supervisor import Supervisor
-from agents.train import Interrupted, train
+from agents.training import Interrupted, train
 from tests.agents.conftest import HINDSIGHT, TINY_ALGORITHMS
 from tests.tiers.sweep import sweep
 

@@ -14,6 +14,7 @@ from physics.compiler.fused.ablation import is_on
 from physics.compiler.notices import warn_once
 
 QUIET_WAIT = 1.0  # time of waiting after which a line on standard error says so [s]
+WAITING = "another process compiles a kernel for this scene, in ten seconds to a minute: waiting for it ..."
 LONGEST_WAIT = 900.0  # time of waiting after which this process compiles, too, in case the other one hangs [s]
 
 
@@ -46,7 +47,7 @@ def _acquired(path: Path):
         try:
             lock.acquire(timeout=QUIET_WAIT)
         except Timeout:
-            warn_once("wait", "another process compiles a kernel for this scene: waiting for it ...")
+            warn_once("wait", WAITING)
             lock.acquire(timeout=LONGEST_WAIT)
     except (OSError, NotImplementedError):  # a `Timeout` is one
         return None
