@@ -164,6 +164,8 @@ class StepReport:
     fault_body : (worlds,) int64
         Index of the first body that `faults` counts; -1: none. Where a fault made a whole world keep its old state,
         it is the first body with the fault.
+    driven_work : (worlds,) float64
+        Work that bodies with a prescribed motion did on the others, through contacts [J].
     """
 
     __slots__ = ("_names", "_table")
@@ -212,6 +214,9 @@ class StepReport:
         @property
         def fault_body(self) -> NDArray[np.int64]: ...
 
+        @property
+        def driven_work(self) -> NDArray[np.float64]: ...
+
     else:
         penetration = property(lambda self: self._table[:, at.PENETRATION])
         residual = property(lambda self: self._table[:, at.RESIDUAL])
@@ -226,6 +231,7 @@ class StepReport:
         coarse = property(lambda self: self._table[:, at.UNRESOLVED_MOTION].astype(np.int64))
         overlap = property(lambda self: self._table[:, at.OVERLAP])
         fault_body = property(lambda self: self._table[:, at.FIRST_FAULTY].astype(np.int64) - 1)
+        driven_work = property(lambda self: self._table[:, at.DRIVEN_WORK])
 
     @property
     def solver(self) -> NDArray[np.int64]:

@@ -69,7 +69,8 @@ CONTACTS_LEFT_OUT = 10  # contacts and near pairs for which there was no room
 OVERLAP = 11  # deepest overlap of two bodies that were placed into each other [m], 0 where it is small
 FIRST_FAULTY = 12  # 1 + the first body at fault, 0: none
 UNRESOLVED_MOTION = 13  # bodies that moved in fields which the step does not resolve
-REPORT_SIZE = 14
+DRIVEN_WORK = 14  # work of driven bodies on the others [J]
+REPORT_SIZE = 15
 
 # Methods that solve contact problems, weakest first.
 METHOD_NONE, METHOD_DIRECT, METHOD_SWEEPS, METHOD_PIVOTING, METHOD_NEWTON = range(5)

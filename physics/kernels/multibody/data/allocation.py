@@ -361,6 +361,8 @@ def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | Non
         clock=np.zeros(2),
         velocity=np.zeros((contacts, 3)),
         target=np.zeros((contacts, 3)),
+        gain=np.zeros(contacts),
+        work=np.zeros(1),
     )
 
 

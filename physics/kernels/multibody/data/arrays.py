@@ -257,6 +257,8 @@ class DrivenBodies(NamedTuple):
     clock: np.ndarray  # (2,) time of the world at the start of the call, and now [s]
     velocity: np.ndarray  # (contacts, 3) velocity of the second end, world frame; 0 unless it is driven [m/s]
     target: np.ndarray  # (contacts, 3) during a solve: targets relative to the driven ends [m/s]
+    gain: np.ndarray  # (contacts,) what its normal component gains from the middle of a stage to the end [m/s]
+    work: np.ndarray  # (1,) work on the other bodies in the present stage, impacts left out [J]
 
 
 class LoneBody(NamedTuple):

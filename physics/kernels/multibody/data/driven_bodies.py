@@ -5,7 +5,9 @@ w = V + Ω x r + s. V and Ω are the prescribed velocity and spin, r is the arm,
 along the body, without its component along the normal. Stages set targets for the velocity relative to w
 (`take_driven_velocities`). For a solve w is added to them (`aim_at_driven_ends`), so that no solver knows of it.
 
-Impulses p do the work Σ p·w on the other bodies (`driven_work`), which is no gain of energy by an error.
+Impulses p and torques T of rolling and spin friction do the work Σ p·w + Σ T·Ω on the other bodies (`driven_work`),
+which is no gain of energy by an error. The report of a step has the work of its impacts, with the velocities of their
+moment, and of its stages, with those at the middle of each.
 
 All of this is left out of kernels whose scene has no body with a motion: `many.driven` is None there.
 """
@@ -105,6 +107,7 @@ def _acceleration_bound(b, h, many):
 def bind_driven_twists(start, h, many):
     """Write twists and accelerations of the driven bodies for a stage of up to h [s], `start` [s] into the call."""
     many.driven.clock[NOW] = call_start(many.driven.clock, many.bodies.body[0]) + start
+    many.driven.work[0] = 0.0
     for b in range(many.bodies.state.shape[0]):
         if is_driven(b, many):
             _put_twist(b, twist_at(many.driven.columns, b, many.driven.clock[NOW]), many)
@@ -209,6 +212,11 @@ def _take_velocity(k, later, many):
         many.driven.velocity[k, c] = w[c]
 
 
+@inlined
+def _normal_velocity(k, many):
+    return qt.dot(row_vector(many.contacts.frame, k, 0), row_vector(many.driven.velocity, k, 0))
+
+
 @if_given("many.driven")
 def take_driven_velocity(k, many):
     """Store the present velocity w of the second end of contact k; 0 unless it is driven."""
@@ -217,12 +225,29 @@ def take_driven_velocity(k, many):
 
 @if_given("many.driven")
 def take_later_velocities(n, h, many):
-    """Store the velocities w of the second ends of the n contacts in h [s], with the present arms; write the twists."""
+    """Store the velocities w of the second ends of the n contacts in h [s], with the present arms; write the twists.
+
+    `many.driven.gain` becomes what their normal components gain until then.
+    """
+    for k in range(n):
+        _take_velocity(k, 0.0, many)
+        many.driven.gain[k] = -_normal_velocity(k, many)
     for b in range(many.bodies.state.shape[0]):
         if is_driven(b, many):
             _put_twist(b, twist_at(many.driven.columns, b, many.driven.clock[NOW] + h), many)
     for k in range(n):
         _take_velocity(k, h, many)
+        many.driven.gain[k] += _normal_velocity(k, many)
+
+
+def _no_gain(k, many):
+    return 0.0
+
+
+@if_given("many.driven", _no_gain)
+def driven_gain(k, many):
+    """Gain of the second end's velocity along the normal of contact k, from the middle of a stage to its end [m/s]."""
+    return many.driven.gain[k]
 
 
 @if_given("many.driven", _velocity)
@@ -267,6 +292,17 @@ def _no_work(n, many):
     return 0.0
 
 
+@if_given("many.resistance", _no_work)
+def _work_of_torques(n, many):
+    """Work that the driven ends of the n contacts do by torques of rolling and spin friction [J]."""
+    total = 0.0
+    for k in range(n):
+        b = -1 - many.walls.shape[0] - many.contacts.bodies[k, 1]
+        if many.resistance.answer[k] > 0.0 and b >= 0 and is_driven(b, many):
+            total += qt.dot(row_vector(many.resistance.torque, k, 0), row_vector(many.bodies.twist, b, 3))
+    return total
+
+
 @kernel
 def _work(n, many):
     E, total = many.contacts.frame, 0.0
@@ -274,10 +310,37 @@ def _work(n, many):
         w = row_vector(many.driven.velocity, k, 0)
         for c in range(3):
             total += many.contacts.impulse[k, c] * qt.dot(row_vector(E, k, 3 * c), w)
-    return total
+    return total + _work_of_torques(n, many)
 
 
 @if_given("many.driven", _no_work)
 def driven_work(n, many):
-    """Work that the driven ends of the n contacts do on the other bodies by the present impulses [J]."""
+    """Work that the driven ends of the n contacts do on the other bodies by the present impulses and torques [J]."""
     return _work(n, many)
+
+
+@if_given("many.driven")
+def note_stage_work(n, h, many):
+    """Note the work of driven bodies in a stage, with their velocities at present; these are taken in h [s] again."""
+    take_later_velocities(n, 0.0, many)
+    many.driven.work[0] = _work(n, many)
+    take_later_velocities(n, h, many)
+
+
+@if_given("many.driven")
+def report_stage_work(world, report, many):
+    """Add the work of the present stage to the world's report."""
+    report[world, at.DRIVEN_WORK] += many.driven.work[0]
+
+
+@if_given("many.driven")
+def report_impact_work(n, world, report, many):
+    """Add the work of driven bodies in an impact of the n contacts to the world's report."""
+    report[world, at.DRIVEN_WORK] += _work(n, many)
+
+
+@if_given("many.driven")
+def extrapolate_reported_work(world, coarse, report, many):
+    """Add to the work after two half steps a third of its difference from that of a whole step, in row `coarse`."""
+    work = report[world, at.DRIVEN_WORK]
+    report[world, at.DRIVEN_WORK] += (work - coarse[at.DRIVEN_WORK]) / 3.0

@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.contact_set import (
     relative_acceleration_bound,
     smaller_radius,
 )
+from physics.kernels.multibody.data.driven_bodies import report_impact_work
 from physics.kernels.multibody.data.warm_torques import clear_torque
 from physics.kernels.multibody.stepping.bouncing import is_bouncing, rest_speed_limit, set_tangential_targets
 from physics.kernels.multibody.stepping.impact_events import log_impacts
@@ -258,6 +259,7 @@ def _resolve_rigid_impacts(n, world, t, h, is_last, switches, records, many):
     set_tangential_targets(n, many, many.bodies.body[0])
     count_impact(many)
     apply_impact_within_energy(n, world, switches.friction, switches.flight.offset_frame, records.report, many)
+    report_impact_work(n, world, records.report, many)
     if records.log.shape[1] > 0:
         log_impacts(n, world, t, many, records.log, records.counts)
     return n, meeting, True

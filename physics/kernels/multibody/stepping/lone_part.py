@@ -19,6 +19,7 @@ from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
+from physics.kernels.multibody.data.driven_bodies import extrapolate_reported_work
 from physics.kernels.multibody.data.lone_body import lone_body
 from physics.kernels.multibody.stepping.allowed_error import allowed_error
 from physics.kernels.multibody.stepping.constraint_projection import project_constraints
@@ -90,6 +91,7 @@ def _step_halves(world, start, half, switches, kept, records, many):
     error = max_body_error(switches.flight.offset_frame, kept, many)
     if error <= 1.0 and many.lone.impacts[0] == 0:
         _extrapolate(kept, many)
+        extrapolate_reported_work(world, kept.report[SNAPSHOT_COARSE], records.report, many)
         project_constraints(world, half, switches, records.memory, many)
     save_snapshot(SNAPSHOT_END, world, kept, records.memory, records.report, many, records.counts)
     return error

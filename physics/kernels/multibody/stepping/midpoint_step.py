@@ -36,8 +36,10 @@ from physics.kernels.multibody.data.contact_set import (
 from physics.kernels.multibody.data.cylinder_balls import is_beside_cylinder, less_turn_beside_cylinder
 from physics.kernels.multibody.data.cylinders import has_cylinders, plus_free_turn
 from physics.kernels.multibody.data.driven_bodies import (
+    driven_gain,
     driven_work,
     moving_body_at,
+    note_stage_work,
     take_later_velocities,
 )
 from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
@@ -197,7 +199,7 @@ def set_resting_targets(n, h, many):
         exchange_twists(a, 1, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many) or has_cylinders(many):
-            gap += 0.5 * half * t[0]
+            gap += 0.5 * half * (t[0] + driven_gain(k, many))
         u = qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many))
         if not may_roll(k, many):
             t = clamp_target_to_energy(t, u)
@@ -334,6 +336,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
             revert_to_dissipative(n, switches.flight.offset_frame, many)
             solve_frictionless_and_apply(n, many)
             foretell_end_gaps(n, after, many)
+    note_stage_work(n, after, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
     kept.store_warm_impulses(n, world, h, sleep, records.memory, many)
     for b in range(many.bodies.state.shape[0]):

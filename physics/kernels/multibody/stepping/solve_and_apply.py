@@ -7,7 +7,11 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import PARTED, add_scaled, put_vector, row_matrix, subtract
 from physics.kernels.multibody.data.driven_bodies import aim_at_driven_ends, aim_at_relative_velocities
-from physics.kernels.multibody.solver.resistance_torques import apply_resistance, solve_with_resistance
+from physics.kernels.multibody.solver.resistance_torques import (
+    apply_resistance,
+    drop_resistance,
+    solve_with_resistance,
+)
 from physics.kernels.multibody.solver.solve import solve_all_frictionless
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import report_solve
@@ -83,6 +87,7 @@ def solve_frictionless_and_apply(n, many):
 
     The report counts the failed solve already.
     """
+    drop_resistance(n, many)
     aim_at_driven_ends(n, many)
     solve_all_frictionless(n, many)
     aim_at_relative_velocities(n, many)

@@ -29,7 +29,7 @@ from physics.kernels.forces.held_loads import advance_clock
 from physics.kernels.half_space.conservative_advancement import MAX_TURNING_CUTS
 from physics.kernels.multibody.data.arrays import NUM_CONTACTS, NUM_DROPPED, NUM_STOPPING, WARM_STAGE_LENGTH
 from physics.kernels.multibody.data.contact_set import smaller_radius
-from physics.kernels.multibody.data.driven_bodies import bind_driven_twists
+from physics.kernels.multibody.data.driven_bodies import bind_driven_twists, report_stage_work
 from physics.kernels.multibody.data.fixed_bodies import body_at
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.data.lone_body import note_slowness
@@ -152,6 +152,7 @@ def substep_world(
         t = step_to_slip_end(n, world, start + (h - left), t, is_whole, switches, sleep, records, many)
         if t < first:
             stops += 1
+        report_stage_work(world, records.report, many)
         left -= t
         for b in range(many.bodies.state.shape[0]):
             advance_clock(t, many.bodies.body[b])
