@@ -129,6 +129,9 @@ def _from_parts(head: Mapping[str, Any], parts: dict[str, np.ndarray]) -> Snapsh
     compiler, scene = head_value(head, "compiler", is_text, "the name of a compiler"), None
     if head["format"] > TIMES:
         scene = head_value(head, "scene", _is_scene, "null and settings of a scene by name, as text")
+    if parts["report_table"].ndim == 2:  # files of earlier versions lack its last columns
+        missing = max(0, at.REPORT_SIZE - parts["report_table"].shape[1])
+        parts["report_table"] = np.pad(parts["report_table"], [(0, 0), (0, missing)])
     arrays = tuple(parts[name] for name in KEPT if name != "sleep" or name in parts)
     rows, worlds = len(parts["state"]), len(parts["gravity"])
     rows_of = {"state": rows, "params": rows, "gravity": worlds, "report_table": worlds, "sleep": rows}

@@ -27,15 +27,14 @@ REST_SPEED = 1e-6  # speed below which a body is at rest [m/s, rad/s]
 
 
 def energy_sources(scene: physics.Scene) -> list[str]:
-    """Names of everything in a scene that may give energy to its bodies; their work is not counted.
+    """Names of effects of a scene that may give energy to its bodies; their work is not counted.
 
-    These are driven bodies, and fields that do not say that they take energy or leave it (`Field.takes_energy`).
-    Springs between bodies are none of them: both ends are bodies of the scene.
+    These are fields that do not say that they take energy or leave it (`Field.takes_energy`). Springs between bodies
+    are none of them: both ends are bodies of the scene. The work of driven bodies is counted.
     """
-    driven = ["driven bodies"] if any(body.motion is not None for body in scene.bodies) else []
     fields = (each for each in scene.effects if isinstance(each, physics.Field))
     giving = (each for each in fields if each.takes_energy is None and not each.kind.is_linked)
-    return [*driven, *dict.fromkeys(type(each).__name__ for each in giving)]
+    return list(dict.fromkeys(type(each).__name__ for each in giving))
 
 
 class Demo:
@@ -100,6 +99,7 @@ class Demo:
         trajectory, world = self.trajectory, self.world
         points, forces = world.contacts()
         energy, sources = trajectory.energy.sum(axis=1), energy_sources(self.scene)
+        work = float(sum(report.driven_work[0] for report in trajectory.reports))
         moving = max(np.abs(trajectory.linvel[-1]).max(), np.abs(trajectory.angvel[-1]).max())
         status = max((int(report.status[0]) for report in trajectory.reports), key=physics.Status.severity, default=0)
         last = {name: getattr(trajectory, name)[-1].tolist() for name in ("pos", "quat", "linvel", "angvel")}
@@ -110,7 +110,8 @@ class Demo:
             "sample_dt": self.dt,
             "energy": {
                 "start": float(energy[0]), "end": float(energy[-1]),
-                "dissipated": None if sources else float(energy[0] - energy[-1]), "sources": sources,
+                "driven_work": work, "dissipated": None if sources else float(energy[0] + work - energy[-1]),
+                "sources": sources,
             },
             "final": {**last, "is_at_rest": bool(moving < REST_SPEED)},
             "contacts": {

@@ -40,11 +40,13 @@ def show(demo: Demo, summary: dict, console: Console) -> None:
 
 
 def _told_energy(energy: dict) -> str:
-    """Energies at both ends, and the loss; where something may give energy, the change and these sources instead."""
+    """Energies at both ends, and the loss; where an effect may give energy, the change and these effects instead."""
     told = f"{energy['start']:.4f} J at the start, {energy['end']:.4f} J at the end"
+    if energy["driven_work"] != 0.0:
+        told += f", {energy['driven_work']:.4f} J of work by driven bodies"
     if energy["dissipated"] is not None:
         return f"{told}, {energy['dissipated']:.4f} J dissipated"
-    change = energy["end"] - energy["start"]
+    change = energy["end"] - energy["start"] - energy["driven_work"]
     more = "gained" if change >= 0 else "lost"
     return f"{told}, {abs(change):.4f} J {more}: work of {', '.join(energy['sources'])} less dissipation"
 

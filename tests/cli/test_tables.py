@@ -208,7 +208,7 @@ def test_a_run_of_many_bodies_is_a_summary(width):
     counts = ("solves", "iterations", "fallbacks", "unconverged")
     status = {"name": "ok", "message": "every contact problem met its tolerance", "residual": 1e-9, "penetration": 0.0}
     content = {
-        "events": [], "final": final, "energy": {"start": 1.0, "end": 1.0, "dissipated": 0.0},
+        "events": [], "final": final, "energy": {"start": 1.0, "end": 1.0, "driven_work": 0.0, "dissipated": 0.0},
         "contacts": {"points": vectors, "forces": vectors}, "status": {**status, **dict.fromkeys(counts, 0)},
     }  # fmt: skip
     console = Console(width=width, file=io.StringIO())

@@ -123,7 +123,7 @@ def test_demo_tells_of_the_fall(tmp_path, monkeypatch, is_exhaustive):
         assert gif.n_frames == 26  # 25 a second, and the start
 
 
-def test_a_run_with_a_driven_body_claims_no_negative_dissipation(tmp_path):
+def test_a_run_counts_the_work_of_a_driven_body(tmp_path):
     """A belt drags a crate of 2 kg up to its speed: the crate gains ½ m v², and friction loses as much as heat."""
     belt = physics.Motion(surface_velocity=(0.8, 0, 0))
     bodies = [
@@ -134,11 +134,11 @@ def test_a_run_with_a_driven_body_claims_no_negative_dissipation(tmp_path):
     path, numbers = tmp_path / "belt.toml", tmp_path / "numbers.json"
     physics.save_scene(physics.Scene(bodies, effects=effects), path)
     output = run("run", path, "--duration", 0.5, "--json", numbers)
-    assert "0.6400 J gained: work of driven bodies less dissipation" in " ".join(output.split())
-    assert "J dissipated" not in output
+    assert "1.2800 J of work by driven bodies, 0.6400 J dissipated" in " ".join(output.split())
     energy = loaded(numbers)["energy"]
-    assert energy["dissipated"] is None
-    assert energy["sources"] == ["driven bodies"]
+    assert energy["driven_work"] == pytest.approx(2.0 * 0.8**2, abs=1e-6)
+    assert energy["dissipated"] == pytest.approx(0.5 * 2.0 * 0.8**2, abs=1e-6)
+    assert energy["sources"] == []
     assert energy["end"] - energy["start"] == pytest.approx(0.5 * 2.0 * 0.8**2, abs=1e-6)
 
 

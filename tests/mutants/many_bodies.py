@@ -511,6 +511,22 @@ DRIVEN = [
         _MOTION + "a_rising_plate_bats_a_block",
     ),
     _mutant(
+        "driven-torque",
+        "The work of a turntable's spin friction is an error of the solver.",
+        "data/driven_bodies.py",
+        "    return total + _work_of_torques(n, many)",
+        "    return total",
+        "physics/test_driven_work.py::test_a_turntable_spins_a_ball_up_by_spin_friction",
+    ),
+    _mutant(
+        "driven-gain",
+        "A body that coasts while its lift slows down has a gap to close.",
+        "stepping/midpoint_step.py",
+        "(t[0] + driven_gain(k, many))",
+        "t[0]",
+        "physics/test_driven_work.py::test_a_block_on_a_lift_has_its_velocity_and_takes_its_work",
+    ),
+    _mutant(
         "driven-arm",
         "The spin of a driven body does not move its contact points.",
         "data/driven_bodies.py",
