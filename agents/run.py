@@ -16,7 +16,7 @@ from agents.evaluate import evaluate, evaluation_seeds, print_evaluation
 from agents.options import write_json
 from agents.record import record
 from agents.supervisor import OnCheckpoint
-from agents.training import train
+from agents.training import Interrupted, interruption_message, train
 from rigid_env.terminal import make_console
 
 EVALUATION_EPISODES = 1000
@@ -92,6 +92,9 @@ def run_or_resume(
         except ValueError:
             run.discard()
             raise
+        except KeyboardInterrupt as interrupt:  # before the first step
+            run.discard()
+            raise Interrupted(interruption_message(run, 0)) from interrupt
         goal = "target reached" if result["is_target_reached"] else "target not reached within the limit"
         console.print(f"{goal}: {result['steps']:,} steps in {result['training_seconds']:.1f} s")
         evaluation = finish(config, run, result.pop("policy"), with_video, console)

@@ -34,7 +34,7 @@ INTERRUPTED = 130  # exit status of a program ended by Ctrl-C
 
 
 def __getattr__(name: str) -> Any:
-    """Import `run_or_resume`, and PyTorch with it, when it is asked for."""
+    """Import `run_or_resume`, and PyTorch with it, at the first use."""
     if name == "run_or_resume":
         from agents.run import run_or_resume
 

@@ -21,7 +21,9 @@ FRICTION_RULE: Rule = "geometric_mean"
 RESTITUTION_RULE: Rule = "maximum"
 """Rule of restitution unless a scene names another one."""
 
-PAIRS_ALLOWED = "allowed is a dict of two names to a number, as {('die', 'tray'): 0.2}"
+PAIRS_ALLOWED = (
+    """allowed is a dict of two names to a number, as {('die', 'tray'): 0.2}; in a file [["die", "tray", 0.2]]"""
+)
 
 
 def checked_rule(rule: Any, field: str) -> str:

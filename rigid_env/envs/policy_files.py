@@ -91,7 +91,8 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     if is_id(os.fspath(validation.path(path, "policy"))) and not Path(path).exists():
         return Network.load(pretrained_path(os.fspath(path)))
     path = Path(path)
-    allowed = f"allowed are a model of Stable-Baselines3 ({MODEL}) and plain arrays ({ARRAYS})"
+    ids = "the id of an environment that comes with one, as rigid_env/BlockReach-v0"
+    allowed = f"allowed are a model of Stable-Baselines3 ({MODEL}), plain arrays ({ARRAYS}), or {ids}"
     if not path.is_file():
         raise ValueError(f"policy is {str(path)!r}, which is no file; {allowed}")
     ending = path.suffix.lower()

@@ -13,6 +13,7 @@ import physics
 from physics.io.mjcf.files import from_mjcf, read_mjcf
 from physics.io.mjcf.model import compile_model
 from physics.io.mjcf.text import parse
+from physics.io.mjcf.writer import to_mjcf
 
 mujoco = pytest.importorskip("mujoco", minversion="3.3.7")
 from tests.physics.mjcf_texts import HILLS, READ, REFUSED, box, floor, model  # noqa: E402 - after the skip
@@ -43,6 +44,21 @@ def test_a_cylinder_of_the_world_is_fixed():
     assert (found.kind, found.radius, found.height, found.pos) == ("cylinder", 0.1, 0.4, (1.0, 2.0, 3.0))
     axis = Rotation.from_quat(found.quat, scalar_first=True).apply((0, 1, 0))
     np.testing.assert_allclose(axis, (0, -1, 0), atol=1e-15)
+
+
+def test_fixed_bodies_come_back_with_their_names_where_the_file_names_their_geoms():
+    parts = [physics.Block((1, 1, 1), fixed=True), physics.Sphere(0.5, fixed=True, pos=(1, 0, 0))]
+    bodies = [
+        physics.Block((1, 0.5, 0.7), mass=2.0, pos=(0, 3, 0), name="crate"),
+        physics.Block((30, 1, 4), fixed=True, name="table"),
+        physics.Sphere(0.3, fixed=True, pos=(3, 0, 0)),
+        physics.Compound(parts, fixed=True, pos=(9, 0, 0)),
+    ]
+    effects = [physics.Gravity(), physics.Contact(), physics.Friction(0.3, pairs={("crate", "table"): 0.2})]
+    text = to_mjcf(physics.Scene(bodies, effects=effects))
+    assert "geom3.1" in text
+    found = from_mjcf(text).bodies
+    assert [(body.kind, body.name) for body in found] == [(body.kind, body.name) for body in bodies]
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

@@ -15,7 +15,7 @@ from physics.io.mjcf.model import ORIGIN, Model, Pose
 from physics.io.mjcf.shapes import Placed, make_body, make_fixed, make_part
 from physics.io.mjcf.text import ModelError
 from physics.io.mjcf.touching import Touching
-from physics.io.mjcf.writer import unnamed
+from physics.io.mjcf.writer import own_name, unnamed
 from physics.mass.inertia import MassProperties, compose
 from physics.rotations import product, rotation_matrices
 from physics.scene.bodies import Body
@@ -86,7 +86,8 @@ def fixed_bodies(model: Model, touching: Touching, geoms: list[int], left: LeftO
         together.setdefault(int(m.geom_bodyid[geom]), []).append(geom)
     for root, members in together.items():
         is_alike = all(touching.are_alike(members[0], geom) for geom in members)
-        if root > 0 and len(members) > 1 and is_alike and not any(model.name("geom", geom) for geom in members):
+        has_names = any(own_name(model.name("geom", geom)) for geom in members)
+        if root > 0 and len(members) > 1 and is_alike and not has_names:
             found += _fixed_compound(model, root, members, left)
         else:
             found += _fixed_geoms(model, members, left)
@@ -113,7 +114,7 @@ def _fixed_geoms(model: Model, geoms: list[int], left: LeftOut) -> list[FixedEle
         root, frame = int(m.geom_bodyid[geom]), model.geom_frames[geom]
         kind = model.kind("mjtGeom", "mjGEOM_", m.geom_type[geom])
         is_only = root > 0 and m.body_geomnum[root] == 1
-        name = model.name("geom", geom) or (model.name("body", root) if is_only else "")
+        name = own_name(model.name("geom", geom)) or (model.name("body", root) if is_only else "")
         if kind == "mesh":
             frame = model.frames[root]
             shape = (_points(model, geom) - frame.pos) @ frame.R

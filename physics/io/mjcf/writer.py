@@ -7,6 +7,7 @@ The velocities at the start are in a keyframe `start`.
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Container
 from itertools import product
@@ -58,6 +59,11 @@ def wall_name(k: int, name: str | None, taken: Container[str | None]) -> str | N
 def geom_name(b: int) -> str:
     """Name in MJCF of the geom of body number `b` of a scene, if a pair names it."""
     return f"geom{b}"
+
+
+def own_name(name: str) -> str:
+    """Name of a geom in MJCF; "" if it is one that the writer gives, of `geom_names`."""
+    return "" if re.fullmatch(r"geom\d+(\.\d+)?", name) else name
 
 
 def geom_names(b: int, body: Body) -> list[str]:
