@@ -69,7 +69,7 @@ def test_a_block_on_a_lift_has_its_velocity_and_takes_its_work(accuracy, way):
 
 
 # For half a second the acceleration falls at j = 19.2 m/s³. The velocity v at the middle of a step h then differs from
-# its mean by j h²/24, which is 4e-5 J in all for v = 1.2 m/s; the bound is five times that. At `precise` rounding is left.
+# its mean by j h²/24, which is 4e-5 J in all for v = 1.2 m/s; the bound is five times that. `precise` leaves rounding.
 @pytest.mark.exhaustive
 @pytest.mark.parametrize(("accuracy", "most"), [("balanced", 2e-4), ("precise", 1e-10)])
 def test_a_whole_ride_from_rest_to_rest_takes_the_work_of_gravity(accuracy, most):
