@@ -378,6 +378,22 @@ STEPPING = [
         "physics/test_compliance_precise.py::test_a_ball_bobs_on_its_spring",
     ),
     _mutant(
+        "stepping-switches",
+        "The error after bodies with springs have met does not count.",
+        "stepping/spring_switches.py",
+        "return max(error, _SWITCH_WEIGHT * many.compliance.switch[0] / allowed_error(many))",
+        "return error",
+        "physics/test_compliance_precise.py::test_a_ball_lands_on_a_heavy_body_in_the_second_half_of_a_part",
+    ),
+    _mutant(
+        "stepping-extrapolation",
+        "Parts of several bodies on springs are not extrapolated.",
+        "stepping/adaptive_substep.py",
+        "            extrapolate_springs(kept, many)\n",
+        "            pass\n",
+        "physics/test_compliance_precise.py::test_two_balls_have_half_the_mass",
+    ),
+    _mutant(
         "stepping-tangential-aim",
         "An impact aims at the tangential velocity before it in one direction of the plane, not against it.",
         "stepping/bouncing.py",

@@ -400,9 +400,9 @@ def _make_resistance(bodies: int, contacts: int) -> Resistance:
 
 
 def _make_compliance(bodies: int, contacts: int) -> Compliance:
-    rows = [np.zeros(contacts) for _ in range(5)]
+    rows = [np.zeros(contacts) for _ in range(6)]
     sums = [np.zeros(bodies) for _ in range(3)]
-    return Compliance(*rows, np.zeros((contacts, 2)), *sums, last_drift=np.zeros(1))
+    return Compliance(*rows, np.zeros((contacts, 2)), *sums, last_drift=np.zeros(1), switch=np.zeros(1))
 
 
 def _make_settings(settings: dict[str, float]) -> np.ndarray:

@@ -302,12 +302,14 @@ class Compliance(NamedTuple):
     unpaid: np.ndarray  # (contacts,) depth at the start of the stage that no force has caused; it does not push [m]
     start_gap: np.ndarray  # (contacts,) gap at the start of the stage, unpaid depth left out, as below [m]
     coast_gap: np.ndarray  # (contacts,) gap at its end, without the velocities after the impulses [m]
+    start_speed: np.ndarray  # (contacts,) rate of the gap at the start of the stage [m/s]
     end_gap: np.ndarray  # (contacts,) gap at its end, as the contact problem foretells it [m]
     plain: np.ndarray  # (contacts, 2) normal target [m/s] and `coast_gap` [m] of bodies that do not turn
     mobility: np.ndarray  # (bodies,) sum of W_nn over the contacts of each body [1/kg]
     paid: np.ndarray  # (bodies,) sum of the squares of the depths of each body's contacts that forces have caused [m²]
     found: np.ndarray  # (bodies,) the same of the depths at the start of the stage [m²]
     last_drift: np.ndarray  # (1,) length of the last drift of the stage [s]
+    switch: np.ndarray  # (1,) error of the present part by pushes that begin or end, `stepping.spring_switches`
 
 
 class BodiesWorkspace(NamedTuple):

@@ -3,7 +3,9 @@
 Impacts need no short parts: the stages of a part end at the time of impact (`impact`). Other changes of contact cause
 an error of first or second order in the part in which they happen: contacts that open, begin to slip or begin to stick,
 slow impacts, and contact problems whose solution jumps to another one. Halving the part resolves all of them. Between
-such changes the motion is smooth, and the method is of second order.
+such changes the motion is smooth, and the method is of second order. With compliant contact smooth parts are
+extrapolated (`extrapolation`), and parts in which a spring begins or ends to push have smaller errors
+(`spring_switches`).
 
 Lengths of parts are 1, 1/2, 1/4, ... of the substep, and a part begins at a multiple of its length. So when a part is
 refused, its first half is the next one to try, and its single step is known already. After an accepted part the next
@@ -16,6 +18,7 @@ import math
 
 from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.multibody.stepping.compliant_stage import trials_of_springs
+from physics.kernels.multibody.stepping.extrapolation import extrapolate_springs
 from physics.kernels.multibody.stepping.lone_part import step_first_part, step_lone_part
 from physics.kernels.multibody.stepping.part import UNITS_PER_SUBSTEP, following_part, max_body_error, step_part
 from physics.kernels.multibody.stepping.snapshots import (
@@ -25,6 +28,7 @@ from physics.kernels.multibody.stepping.snapshots import (
     restore_snapshot,
     save_snapshot,
 )
+from physics.kernels.multibody.stepping.spring_switches import forget_switches, with_switches
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import are_all_finite
 from physics.kernels.state.fixed_body import is_fixed
@@ -49,7 +53,8 @@ def _step_with_halving(world, start, unit, lengths, switches, kept, sleep, recor
     """Advance the world by a part whose error is allowed: (units taken, its error, number of lengths tried).
 
     A unit is `unit` [s]. The first length tried is `lengths[0]` units; while the error is above 1, in multiples of the
-    allowed one, the length is halved, down to `lengths[1]` units. The accepted state is that after two half steps.
+    allowed one, the length is halved, down to `lengths[1]` units. The accepted state is that after two half steps, with
+    compliant contact extrapolated.
     `start` is the time since the start of the call [s].
     """
     (part, shortest), offset_frame, tried = lengths, switches.flight.offset_frame, 1
@@ -59,10 +64,13 @@ def _step_with_halving(world, start, unit, lengths, switches, kept, sleep, recor
         half = 0.5 * part * unit
         save_snapshot(SNAPSHOT_COARSE, world, kept, records.memory, records.report, many, records.counts)
         restore_snapshot(SNAPSHOT_START, world, kept, records.memory, records.report, many, records.counts)
+        forget_switches(many)
         step_part(world, start, half, switches, sleep, records, many)
         save_snapshot(SNAPSHOT_MIDDLE, world, kept, records.memory, records.report, many, records.counts)
         step_part(world, start + half, half, switches, sleep, records, many)
-        error = max_body_error(offset_frame, kept, many)
+        error = with_switches(max_body_error(offset_frame, kept, many), many)
+        if error <= 1.0:
+            extrapolate_springs(kept, many)
         if error <= 1.0 or part <= shortest:
             return part, error, tried
         restore_snapshot(

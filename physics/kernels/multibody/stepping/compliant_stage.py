@@ -69,6 +69,13 @@ def _share(k, b, first, many):
 
 
 @inlined
+def contact_mobility(k, many):
+    """Entry W_kk of contact k without its compliance [1/kg]."""
+    a, b = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1]
+    return _share(k, a, 0, many) + (_share(k, b, 3, many) if b >= 0 else 0.0)
+
+
+@inlined
 def _largest_mobility(n, many):
     """Bound w of the largest eigenvalue of the normal part of W, over n contacts [1/kg]; see the module."""
     total = many.compliance.mobility
@@ -183,6 +190,7 @@ def aim_at_springs(k, gain, before, after, many):
     soft.plain[k, 0] = -(stiffness * (theta * gap + (1.0 - theta) * start) + damping * (1.0 - theta) * speed) / D
     soft.plain[k, 1] = gap
     speed -= before * gain
+    soft.start_speed[k] = speed
     gap += 0.5 * after * after * gain
     push = stiffness * (theta * gap + (1.0 - theta) * start)
     push += damping * (theta * after * gain + (1.0 - theta) * speed)

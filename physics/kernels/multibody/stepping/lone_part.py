@@ -16,13 +16,11 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import if_given, inlined, kernel
-from physics.kernels.math import quaternion as qt
-from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.contact_set import add_scaled, put_vector, subtract
 from physics.kernels.multibody.data.driven_bodies import extrapolate_reported_work
 from physics.kernels.multibody.data.lone_body import lone_body
 from physics.kernels.multibody.stepping.allowed_error import allowed_error
 from physics.kernels.multibody.stepping.constraint_projection import project_constraints
+from physics.kernels.multibody.stepping.extrapolation import extrapolate_body
 from physics.kernels.multibody.stepping.part import (
     following_part,
     max_body_error,
@@ -43,7 +41,6 @@ from physics.kernels.multibody.stepping.sudden_change import (
     note_rates,
     sudden_change,
 )
-from physics.kernels.state import layout as at
 from physics.kernels.state.body import are_all_finite
 
 # Weight of the errors of parts in which a sudden change is or may be: such a part is one of few, and its error should
@@ -54,25 +51,6 @@ _SUDDEN_WEIGHT = 256.0
 # no shorter part would help: a slow landing changes the velocity at once, however short the part is.
 _FALLING_SHARE = 0.75
 _MAX_STALLS = 2
-
-
-@inlined
-def _extrapolate(kept, many):
-    """Add to the state of the lone body after two half steps a third of its difference from that of a whole step."""
-    b = lone_body(many)
-    state, coarse = many.bodies.state, kept.state[SNAPSHOT_COARSE]
-    for first in (at.POS, at.LINVEL, at.ANGMOM):
-        fine = row_vector(state, b, first)
-        put_vector(state, b, first, add_scaled(fine, 1.0 / 3.0, subtract(fine, row_vector(coarse, b, first))))
-    same = 0.0
-    for c in range(at.QUAT, at.QUAT + 4):
-        same += state[b, c] * coarse[b, c]
-    sign = math.copysign(1.0, same)  # both quaternions of an attitude are the same to a step
-    for c in range(at.QUAT, at.QUAT + 4):
-        state[b, c] += (state[b, c] - sign * coarse[b, c]) / 3.0
-    q = qt.normalise((state[b, at.QUAT], state[b, at.QUAT + 1], state[b, at.QUAT + 2], state[b, at.QUAT + 3]))
-    for c in range(4):
-        state[b, at.QUAT + c] = q[c]
 
 
 @inlined
@@ -90,7 +68,7 @@ def _step_halves(world, start, half, switches, kept, records, many):
     note_rates(SECOND_HALF, SNAPSHOT_MIDDLE, half, kept, many)
     error = max_body_error(switches.flight.offset_frame, kept, many)
     if error <= 1.0 and many.lone.impacts[0] == 0:
-        _extrapolate(kept, many)
+        extrapolate_body(lone_body(many), kept, many)
         extrapolate_reported_work(world, kept.report[SNAPSHOT_COARSE], records.report, many)
         project_constraints(world, half, switches, records.memory, many)
     save_snapshot(SNAPSHOT_END, world, kept, records.memory, records.report, many, records.counts)

@@ -75,6 +75,7 @@ from physics.kernels.multibody.stepping.lone_stage import (
     residual_of_lone,
 )
 from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
+from physics.kernels.multibody.stepping.spring_switches import note_switches
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
 from physics.kernels.state.fixed_body import is_fixed
@@ -338,6 +339,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
             foretell_end_gaps(n, after, many)
     note_stage_work(n, after, many)
     many.settings[0].residual_limit, many.settings[0].is_resting_stage, many.settings[0].load_speed = math.inf, 0, 0.0
+    note_switches(n, h, many)
     kept.store_warm_impulses(n, world, h, sleep, records.memory, many)
     for b in range(many.bodies.state.shape[0]):
         if many.bodies.touched[b] == 1:

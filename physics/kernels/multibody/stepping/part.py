@@ -7,7 +7,7 @@ import math
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.forces.held_loads import set_clock
 from physics.kernels.multibody.data.contact_set import subtract
-from physics.kernels.multibody.stepping.allowed_error import allowed_error
+from physics.kernels.multibody.stepping.allowed_error import allowed_error, reference_speed
 from physics.kernels.multibody.stepping.snapshots import SNAPSHOT_COARSE
 from physics.kernels.multibody.stepping.substep import substep_world
 from physics.kernels.state.body import angular_velocity, read_state
@@ -29,8 +29,7 @@ def _body_error(b, offset_frame, kept, many):
     """Error of body b: difference between its present state and that of the snapshot `SNAPSHOT_COARSE`.
 
     It is the larger of two ratios. One is the largest distance between points of the body in the two poses, in bounding
-    radii. The other is the difference in velocity relative to the body's speed. That speed counts as at least √(r a):
-    the one that loads of acceleration a give over a bounding radius r.
+    radii. The other is the difference in velocity relative to the body's `reference_speed`.
     """
     body = many.bodies.body[b]
     x, q, v, L = read_state(many.bodies.state, b)
@@ -43,9 +42,8 @@ def _body_error(b, offset_frame, kept, many):
     pose = _length(way) + 2.0 * r * math.sqrt(min(same, other))
     pose = max(0.0, pose - _POSITION_ROUNDING * _length(x)) / r
     w, z = angular_velocity(q, L, body, offset_frame), angular_velocity(p, K, body, offset_frame)
-    speed = _length(v) + r * _length(w) + math.sqrt(r * body.acceleration)
     change = _length(subtract(v, u)) + r * _length(subtract(w, z))
-    return max(pose, change / speed) if change > 0.0 else pose
+    return max(pose, change / reference_speed(v, w, body)) if change > 0.0 else pose
 
 
 @inlined
