@@ -135,6 +135,8 @@ def main(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
+    import agents.run  # noqa: F401 - PyTorch, before there is a folder that Ctrl-C would leave empty
+
     run = make_folder(out, config) if resume is None and folder is None else RunFolder(resume or folder)
     result = _run(config, run, video, tensorboard, console)
     if json_file is not None:
