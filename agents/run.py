@@ -93,8 +93,9 @@ def run_or_resume(
             run.discard()
             raise
         except KeyboardInterrupt as interrupt:  # before the first step
+            kept = list_checkpoints(run.checkpoints)
             run.discard()
-            raise Interrupted(interruption_message(run, 0)) from interrupt
+            raise Interrupted(interruption_message(run, int(kept[-1].name) if kept else 0)) from interrupt
         goal = "target reached" if result["is_target_reached"] else "target not reached within the limit"
         console.print(f"{goal}: {result['steps']:,} steps in {result['training_seconds']:.1f} s")
         evaluation = finish(config, run, result.pop("policy"), with_video, console)

@@ -68,20 +68,27 @@ def choose_config(resume: Path | None, hyperparameters: Path, fixed: dict[str, A
     return RunFolder(resume).read_config()
 
 
-def _run(config: RunConfig, run: RunFolder, with_video: bool, with_tensorboard: bool, console: Console) -> dict:
-    """Run, or go on with, a run and return its result; imports PyTorch."""
+def _run(
+    config: RunConfig, given: Path | None, out: Path, with_video: bool, with_tensorboard: bool, console: Console
+) -> tuple[RunFolder, dict[str, Any]]:
+    """Run, or go on with, a run in the folder `given`, or in a new one in `out`; return its folder and its result.
+
+    PyTorch is imported before the folder is made: Ctrl-C meanwhile leaves none.
+    """
     from agents.run import check_same, read_result, run_or_resume
     from agents.training import Interrupted
 
+    run = make_folder(out, config) if given is None else RunFolder(given)
     console.print(f"run         {run.path}", soft_wrap=True)
     try:
         if run.config.is_file():
             check_same(run, config)
         if read_result(run, config) is not None:
             console.print("This run is complete: a larger --max-steps or --target trains on.")
-        return run_or_resume(
+        result = run_or_resume(
             config, run.path, with_video=with_video, with_tensorboard=with_tensorboard, console=console
         )
+        return run, result
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     except Interrupted as interruption:
@@ -135,10 +142,7 @@ def main(
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
-    import agents.run  # noqa: F401 - PyTorch, before there is a folder that Ctrl-C would leave empty
-
-    run = make_folder(out, config) if resume is None and folder is None else RunFolder(resume or folder)
-    result = _run(config, run, video, tensorboard, console)
+    run, result = _run(config, resume or folder, out, video, tensorboard, console)
     if json_file is not None:
         write_json(json_file, result)
     for name, path in (("curve", run.curve.with_suffix(".png")), ("evaluation", run.evaluation), ("policy", run.model)):

@@ -37,6 +37,16 @@ def without_times(result) -> str:
 
 
 @ppo_alone
+def test_ctrl_c_before_the_first_step_says_so_and_leaves_no_folder(tiny, tmp_path, monkeypatch):
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.training.make_training_env", interrupted)
+    with pytest.raises(Interrupted, match="before the first checkpoint"):
+        run_or_resume(tiny, tmp_path / "run", console=QUIET)
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_run_goes_on_wherever_it_was_ended(tiny, tmp_path, monkeypatch):
     tiny = change(tiny, env_kwargs={"max_episode_steps": 5, **tiny.env_kwargs})
     straight = run_or_resume(tiny, tmp_path / "straight", console=QUIET)
