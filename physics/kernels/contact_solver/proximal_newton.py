@@ -131,7 +131,7 @@ def _fill_newton_matrix(n, factor, inv_mass, scratch):
 
 
 @inlined
-def _eliminate(A):
+def solve_six(A):
     """Solve the 6 x 6 linear system A, with the right-hand side in column 6, by Gauss's elimination.
 
     The solution is written to column 6; the other columns are overwritten.
@@ -161,7 +161,7 @@ def _newton_step(n, size, factor, inv_mass, scratch):
     solver = scratch.solver
     x, start, step = solver.twist, solver.start, solver.newton
     _fill_newton_matrix(n, factor, inv_mass, scratch)
-    _eliminate(solver.newton)
+    solve_six(solver.newton)
     for c in range(6):
         start[c] = x[c]
     after = size
