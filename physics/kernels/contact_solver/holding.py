@@ -1,17 +1,18 @@
-"""Hold a body whose loads its contacts can bear without sliding, where other solvers let it slide.
+"""Hold a body whose loads its contacts can bear without sliding, where the contact solvers let it slide.
 
 Coulomb's law alone does not tell whether such a body moves. Four contacts of a face may share a load in many ways, and
-each has a limit of friction of its own: some let the body slide, others hold it. The law accepts both. Here a body
-that can hold does hold, as in statics: it stays at rest if any impulses in the friction cones bear its loads.
+each has a limit of friction of its own: some let the body slide, others hold it. The law accepts both. In the
+event-driven scheme a body at rest that can hold does hold, as in statics: it stays where it is if any forces in the
+friction cones bear its loads. (Time stepping takes what its solvers find.)
 
-Of these impulses the least are taken, which are unique. Let A be the 6 x 3n matrix from impulses p to their sum and
-moment, W what all contacts sticking exert (`sticking_twist`), and K the product of the friction cones. To minimise
-|p|²/2 over K with A p = W is to solve, for six multipliers λ,
+Of these forces the least are taken, which are unique. Let A be the 6 x 3n matrix from forces p to their sum and moment,
+W the opposite of the loads, and K the product of the friction cones. To minimise |p|²/2 over K with A p = W is to
+solve, for six multipliers λ,
 
     A p(λ) = W,    p(λ) = the point of K nearest to Aᵀ λ.
 
-This is the gradient of a convex function, |p(λ)|²/2 - λ·W, which Newton's method minimises. If no impulses in K bear W,
-the function has no lower bound, and the search ends without a result.
+This sets the gradient of a convex function, |p(λ)|²/2 - λ·W, to zero. Newton's method minimises it. If no forces in K
+balance the loads, the function has no lower bound, and the search ends without a result.
 
 References
 ----------
@@ -29,67 +30,29 @@ from physics.compiler.decorators import inlined, kernel
 from physics.kernels.contact_law.anisotropic_friction import friction_ratio, unstretch_tangents
 from physics.kernels.contact_law.materials import friction_of
 from physics.kernels.contact_solver.proximal_newton import solve_six
-from physics.kernels.contact_solver.sticking_twist import (
-    RIGID_TWIST_TOLERANCE,
-    FreeMotion,
-    bolt_group,
-    largest_target_speed,
-    sticking_twist,
-    world_target,
-)
 from physics.kernels.half_space.contact_point import contact_arm, wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
-from physics.kernels.math.vector import minus, plus, times
-from physics.kernels.state.body import apply_inv_inertia
-
-# A solution nearly holds if no contact moves by more than this share of the fastest contact without impulses.
-_SHARE_OF_HOLDING = 0.5
+from physics.kernels.math.vector import plus, times
 
 # Largest number of Newton steps, and of halvings of a step. Of 300 random loads at 99 % of what friction can hold the
 # hardest needed 15 steps.
 _MAX_NEWTON_STEPS = 30
 _MAX_HALVINGS = 20
 
-# Share of the linear decrease by which a step must lower the function; an error of the function that is rounding; and
-# errors of the sum and the moment that count as zero. All are in units of W.
+# Share of the linear decrease by which a step must lower the function; error of the function that is rounding, a
+# difference of numbers up to a thousand; and error of the sum and the moment that counts as zero, in units of W.
 _SUFFICIENT_DECREASE = 1.0e-4
-_ROUNDING = 1.0e-15
-_ZERO = 1.0e-13
+_ROUNDING = 1.0e-12
+_ZERO = 1.0e-12
 
 # Added to the diagonal of Newton's matrix, in units of its trace: this share of the error, at least the second number.
 # Open contacts leave the matrix singular.
 _REGULARISATION = 3.0e-3
 _LEAST_REGULARISATION = 1.0e-14
 
-# Below this value of the function no impulses of several walls bear the loads, in practice: they would be ten times as
+# Below this value of the function no forces of several walls balance the loads, in practice: they would be ten times as
 # large as these. For one wall see `_lower_bound`.
 _LOWEST = -50.0
-
-
-@inlined
-def _fastest_contact(n, v, w, scratch):
-    """Largest speed of n contacts at the twist (v, w), less their targets [m/s]."""
-    largest = 0.0
-    for i in range(n):
-        m, t = qt.cross(w, contact_arm(scratch.contacts, i)), world_target(i, scratch)
-        d = (v[0] + m[0] - t[0], v[1] + m[1] - t[1], v[2] + m[2] - t[2])
-        largest = max(largest, qt.dot(d, d))
-    return math.sqrt(largest)
-
-
-@inlined
-def nearly_holds(n, free, v, L, scratch):
-    """True if a solution with the motion (v, L) leaves n contacts nearly at their targets; `free` is the `FreeMotion`.
-
-    The first test takes few operations, and sorts out most bodies that slide.
-    """
-    J, r = scratch.body.J, scratch.body.radius
-    push, turn = minus(v, free.v), times(r * max(J[0], max(J[1], J[2])), minus(L, free.L))
-    gain2 = qt.dot(push, push) + qt.dot(turn, turn)
-    if n < 3 or qt.dot(v, v) > 4.0 * (_SHARE_OF_HOLDING * _SHARE_OF_HOLDING) * gain2:
-        return False
-    most = _fastest_contact(n, free.v, apply_inv_inertia(free.R, free.L, J), scratch)
-    return _fastest_contact(n, v, apply_inv_inertia(free.R, L, J), scratch) <= _SHARE_OF_HOLDING * most
 
 
 @inlined
@@ -103,9 +66,9 @@ def _add_outer(A, s, a, b):
 
 @inlined
 def _add_contact(i, push, turn, scratch):
-    """Impulse of contact i at the multipliers (push, turn): its sum, its moment, and the square of its size.
+    """Force of contact i at the multipliers (push, turn): its sum, its moment, and the square of its size.
 
-    Moments are in units of the body's radius times the impulse. `solver.trial` gets the impulse, along stretched
+    Moments are in units of the body's radius times a force. `solver.trial` gets the force, along stretched
     tangents; the derivative is added to `solver.newton`.
     """
     A, p = scratch.solver.newton, scratch.solver.trial
@@ -152,9 +115,9 @@ def _evaluate(n, push, turn, F, T, scratch):
 
 @inlined
 def _lower_bound(n, scratch):
-    """Value below which the function of n contacts cannot be if there are impulses that bear W, with |F| + |T| = 1.
+    """Value below which the function of n contacts cannot be if any forces balance the loads, with |F| + |T| = 1.
 
-    At its least value it is -|p|²/2. The normal impulses of one wall add up to at most 1, and so do their squares; with
+    At its least value it is -|p|²/2. The normal forces of one wall add up to at most 1, and so do their squares; with
     friction |p|² is at most 1 + μ².
     """
     first, last = scratch.contacts.slot[0], scratch.contacts.slot[n - 1]
@@ -182,8 +145,8 @@ def _newton_direction(error, down, round_, scratch):
 
 
 @inlined
-def _find_least_impulses(n, F, T, scratch):
-    """Find the least impulses of n contacts with the sum F and the moment T; return whether there are any.
+def _find_least_forces(n, F, T, scratch):
+    """Find the least forces of n contacts with the sum F and the moment T; return whether there are any.
 
     They go to `solver.trial`, along stretched tangents. |F| + |T| is 1.
     """
@@ -202,7 +165,7 @@ def _find_least_impulses(n, F, T, scratch):
         for _ in range(_MAX_HALVINGS):
             new_push, new_turn = plus(push, times(t, dp)), plus(turn, times(t, dt))
             value, down, round_ = _evaluate(n, new_push, new_turn, F, T, scratch)
-            if value <= old + _SUFFICIENT_DECREASE * t * slope + _ROUNDING * abs(old):
+            if value <= old + _SUFFICIENT_DECREASE * t * slope + _ROUNDING:
                 break
             t *= 0.5
         if not value > lowest:
@@ -212,38 +175,21 @@ def _find_least_impulses(n, F, T, scratch):
 
 
 @kernel
-def hold_contacts(n, R, v, L, scratch):
-    """Try to find impulses with which all n contacts of several on a plane or more move at their targets.
+def hold_at_rest(n, a, moment, scratch):
+    """Try to find forces of n contacts that keep a body at rest, three at least; return whether there are any.
 
-    Parameters and result are those of `sticking.solve_all_sticking`; contacts on a line are left to other solvers.
-
-    Returns
-    -------
-    found : bool
-        False if there are no such impulses. `contacts.impulse` is then unchanged.
-    v, L : tuples of 3 floats
-        Velocity and angular momentum with the contact impulses, if found.
+    Without them the centre of mass has the acceleration a [m/s²], and the angular momentum about it the rate `moment`
+    [N m], both in the world frame. If found, the forces [N] take the place of impulses in `contacts.impulse`; otherwise
+    that is unchanged. Of `contacts`, `slot` and `arm` are read.
     """
-    contacts, body = scratch.contacts, scratch.body
-    free, J = FreeMotion(R, v, L), body.J
-    for i in range(n):
-        scratch.solver.active[i] = 1
-    group = bolt_group(n, n, scratch)
-    if group.is_line:
-        return False, v, L
-    largest = largest_target_speed(n, contacts)
-    v_new, w_new = sticking_twist(n, group, largest == 0.0, free, scratch)
-    if largest > 0.0:
-        miss = _fastest_contact(n, v_new, w_new, scratch)
-        if not miss <= max(RIGID_TWIST_TOLERANCE * largest, scratch.stage.target_error_limit):
-            return False, v, L
-    wb = qt.transposed_matvec(R, w_new)
-    L_new = qt.matvec(R, (wb[0] / J[0], wb[1] / J[1], wb[2] / J[2]))
-    F, T = times(body.mass, minus(v_new, v)), times(1.0 / body.radius, minus(L_new, L))
+    body = scratch.body
+    F, T = times(-body.mass, a), times(-1.0 / body.radius, moment)
     size = math.sqrt(qt.dot(F, F)) + math.sqrt(qt.dot(T, T))
-    if not size > 0.0 or not _find_least_impulses(n, times(1.0 / size, F), times(1.0 / size, T), scratch):
-        return False, v, L
+    if n < 3 or not size > 0.0:
+        return False
+    if not _find_least_forces(n, times(1.0 / size, F), times(1.0 / size, T), scratch):
+        return False
     for r in range(3 * n):
-        contacts.impulse[r] = size * scratch.solver.trial[r]
+        scratch.contacts.impulse[r] = size * scratch.solver.trial[r]
     unstretch_tangents(n, scratch)
-    return True, v_new, L_new
+    return True

@@ -20,13 +20,11 @@ from physics.kernels.contact_solver.gauss_seidel import (
     normal_sweeps,
     update_contact_velocities,
 )
-from physics.kernels.contact_solver.holding import hold_contacts, nearly_holds
 from physics.kernels.contact_solver.patch_start import may_stick
 from physics.kernels.contact_solver.proximal_newton import proximal_newton
 from physics.kernels.contact_solver.single_wall import solve_single_wall
 from physics.kernels.contact_solver.sliding_patch import TRY_STICKING
 from physics.kernels.contact_solver.sticking import solve_all_sticking
-from physics.kernels.contact_solver.sticking_twist import FreeMotion
 from physics.kernels.half_space.contact_point import wall_axes, wall_of
 from physics.kernels.math import quaternion as qt
 from physics.kernels.state.layout import METHOD_DIRECT, METHOD_PIVOTING, METHOD_SWEEPS
@@ -143,7 +141,7 @@ def _solve_sticking(n, R, v, L, scratch):
 
 @shared_kernel
 def _solve_directly(n, friction, R, v, L, scratch):
-    """Try the direct solvers `solve_all_sticking` and `solve_single_wall`: (found, all stick, v, L, residual).
+    """Try the direct solvers `solve_all_sticking` and `solve_single_wall`: (found, v, L, residual).
 
     The one that is more likely to succeed comes first. For a single contact this is `solve_single_wall`. For three or
     four contacts of one wall `may_stick` decides. For two contacts, and for contacts of several walls, it is the
@@ -161,18 +159,17 @@ def _solve_directly(n, friction, R, v, L, scratch):
         if is_one_wall and n > 2:
             holds_first = may_stick(n, friction_at(wall, scratch.body), wall_axes(scene.walls, wall), v, L, scratch)
     found, v_new, L_new, residual = False, v, L, 0.0
-    holds = False
     if holds_first:
         found, v_new, L_new, residual = _solve_sticking(n, R, v, L, scratch)
         if found:
-            stage.mode, holds = TRY_STICKING, True
+            stage.mode = TRY_STICKING
     if not found and is_one_wall and not (is_soft and n > 2):
         found, v_new, L_new, residual = solve_single_wall(n, friction, wall, R, v, L, scratch)
     if not found and may_all_hold and not holds_first:
         found, v_new, L_new, residual = _solve_sticking(n, R, v, L, scratch)
         if found:
-            stage.mode, holds = TRY_STICKING, True
-    return found, holds, v_new, L_new, residual
+            stage.mode = TRY_STICKING
+    return found, v_new, L_new, residual
 
 
 @inlined
@@ -244,25 +241,6 @@ def _solve_iteratively(n, contact, v, L, R, scratch):
     return v, L, residual, sweeps, method
 
 
-def _leave_sliding(n, contact, free, solved, scratch):
-    return solved
-
-
-@if_given("contact.friction", _leave_sliding)
-def _hold_if_possible(n, contact, free, solved, scratch):
-    """Solution (v, L, residual) in which the body holds, if `solved` lets it nearly hold and friction can (`holding`).
-
-    `free` is the `FreeMotion` without contact impulses.
-    """
-    v, L, residual = solved
-    if contact_stiffness(scratch.body) > 0.0 or not nearly_holds(n, free, v, L, scratch):
-        return v, L, residual
-    found, held_v, held_L = hold_contacts(n, free.R, free.v, free.L, scratch)
-    if found:
-        return held_v, held_L, 0.0
-    return v, L, residual
-
-
 @kernel
 def solve_contacts(n, contact, v, L, R, scratch):
     """Solve the contact problem of n contacts in `scratch`: impulses that bring them to their targets, within friction.
@@ -293,10 +271,7 @@ def solve_contacts(n, contact, v, L, R, scratch):
     method : int
         METHOD_DIRECT, METHOD_SWEEPS or METHOD_PIVOTING, the last one tried.
     """
-    sweeps, method = 0, METHOD_DIRECT
-    found, holds, v_new, L_new, residual = _solve_directly(n, contact.friction, R, v, L, scratch)
-    if not found:
-        v_new, L_new, residual, sweeps, method = _solve_iteratively(n, contact, v, L, R, scratch)
-    if not holds:
-        v_new, L_new, residual = _hold_if_possible(n, contact, FreeMotion(R, v, L), (v_new, L_new, residual), scratch)
-    return v_new, L_new, residual, sweeps, method
+    found, v_new, L_new, residual = _solve_directly(n, contact.friction, R, v, L, scratch)
+    if found:
+        return v_new, L_new, residual, 0, METHOD_DIRECT
+    return _solve_iteratively(n, contact, v, L, R, scratch)

@@ -34,6 +34,7 @@ import math
 
 from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.contact_law.materials import bind_materials
+from physics.kernels.contact_solver.holding import hold_at_rest
 from physics.kernels.contact_solver.solve import solve_contacts
 from physics.kernels.event_driven.acceleration_problem import read_resting_mode
 from physics.kernels.event_driven.chatter_control import (
@@ -140,6 +141,22 @@ def begin_event_substep(y, start, h, offset_frame, memory, scratch, motion):
     motion.pace.skipped_bounce_time, motion.pace.sequential_impacts = 0.0, 0
 
 
+def _may_slide(contact, n, free, solved, scratch):
+    return solved
+
+
+@if_given("contact.friction", _may_slide)
+def _hold_if_possible(contact, n, free, solved, scratch):
+    """Acceleration and moment of a body whose n contacts are at rest: zero if it can stay at rest, else `solved`.
+
+    `free` are those without contact forces.
+    """
+    a, moment = solved
+    if qt.dot(a, a) + qt.dot(moment, moment) > 0.0 and hold_at_rest(n, free[0], free[1], scratch):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    return a, moment
+
+
 @kernel
 def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motion, report):
     """Find the contact mode of the body from y on: (MODE_ code, whether a contact problem was solved for it).
@@ -158,10 +175,12 @@ def classify_mode(y, is_foretold, watched, contact, offset_frame, scratch, motio
     if what not in (MODE_UNDECIDED, MODE_UNDECIDED_SLIDING):
         return what, False
     if n > 0:
-        P = principal_rotation(seen, offset_frame, scratch.body)
+        P, free = principal_rotation(seen, offset_frame, scratch.body), (v, L)
         solved = solve_contacts(n, contact, v, L, P, scratch)
         report_impact_solve(solved, report, scratch)
         v, L = solved[0], solved[1]
+        if what == MODE_UNDECIDED:
+            v, L = _hold_if_possible(contact, n, free, (v, L), scratch)
     what = read_resting_mode(
         n, seen, v, L, contact.friction, what == MODE_UNDECIDED_SLIDING, offset_frame, scratch, motion
     )
