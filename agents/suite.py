@@ -45,16 +45,13 @@ def short_name(env_id: str) -> str:
 # --- what is measured ------------------------------------------------------------------------------------------------
 
 
-def judge_trial(trial: Trial, out: str) -> dict[str, Any]:
-    """Judge a complete trial's policy at every preset of the engine; returns success rates by preset."""
+def judge_trial(trial: Trial, out: str, accuracy: str) -> dict[str, Any]:
+    """Judge a complete trial's policy at a preset of the engine; returns `agents.evaluate.evaluate`'s numbers."""
     from agents.checkpoint import load_policy
 
     config, policy = load_policy(RunFolder(Path(out) / trial.name))
-    return {
-        accuracy: evaluate(config.env, policy, JUDGED_EPISODES, config.seed,
-                           **{**config.evaluation_arguments, "accuracy": accuracy})
-        for accuracy in PRESETS
-    }  # fmt: skip
+    arguments = {**config.evaluation_arguments, "accuracy": accuracy}
+    return evaluate(config.env, policy, JUDGED_EPISODES, config.seed, **arguments)
 
 
 def measure_floors(env_id: str) -> dict[str, Any]:
@@ -96,29 +93,71 @@ def is_written(path: Path, result: dict[str, Any] | None = None) -> bool:
     return result is None or (kept["evaluation"] == result["evaluation"] and bool(kept["judged"]))
 
 
+class Judgements:
+    """What a complete trial's policy reaches at each preset, kept in the folder of its run as soon as it is known.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the runs.
+    trial : Trial
+    result : dict
+        Result of the trial. Judgements of a policy with another one are left out.
+    """
+
+    def __init__(self, out: Path, trial: Trial, result: dict[str, Any]) -> None:
+        self.trial, self.result = trial, result
+        self._path = out / trial.name / "judged.json"
+        kept = json.loads(self._path.read_text(encoding="utf-8")) if self._path.is_file() else {}
+        is_of_this = kept.get("evaluation") == result["evaluation"]
+        self.found: dict[str, dict[str, Any]] = kept["judged"] if is_of_this else {}
+
+    @property
+    def missing(self) -> list[str]:
+        """Presets at which the policy has not been judged."""
+        return [accuracy for accuracy in PRESETS if accuracy not in self.found]
+
+    def keep(self, accuracy: str, numbers: dict[str, Any]) -> None:
+        """Keep the numbers of a preset."""
+        known = {**self.found, accuracy: numbers}
+        self.found = {name: known[name] for name in PRESETS if name in known}
+        write_json(self._path, {"evaluation": self.result["evaluation"], "judged": self.found})
+
+
 # --- the command -----------------------------------------------------------------------------------------------------
 
 
 def write_results(trials: Sequence[Trial], out: Path, results: Path, place: Place, console: Console) -> list[str]:
-    """Judge complete trials and measure floors that are not yet written, on the launcher; returns errors."""
+    """Judge complete trials and measure floors that are not yet written, on the launcher; returns errors.
+
+    A preset of a trial is a job: one that is ended loses no more than this.
+    """
     done = complete(trials, out)
-    by_name = {
-        f"judge {t.name}": t for t in trials if t.name in done and not is_written(trial_file(results, t), done[t.name])
-    }
+    left = [Judgements(out, t, done[t.name]) for t in trials
+            if t.name in done and not is_written(trial_file(results, t), done[t.name])]  # fmt: skip
+    judging = {f"judge {each.trial.name} at {name}": (each, name) for each in left for name in each.missing}
     floors = {f"floors of {env}": env for env in dict.fromkeys(t.config.env for t in trials)
               if not is_written(floors_file(results, env))}  # fmt: skip
-    jobs = [Job(name, partial(judge_trial, trial, str(out)), "") for name, trial in by_name.items()]
+    jobs = [Job(job, partial(judge_trial, each.trial, str(out), name), "") for job, (each, name) in judging.items()]
     jobs += [Job(name, partial(measure_floors, env), "") for name, env in floors.items()]
     errors = []
-    for name, found, error, _ in place.watch(jobs, console) if jobs else ():
+    for job, found, error, _ in place.watch(jobs, console) if jobs else ():
         if found is None:
-            errors.append(f"{name}: {error}")
-        elif name in floors:
-            write_json(floors_file(results, floors[name]), {"env": floors[name], "floors": found})
+            errors.append(f"{job}: {error}")
+        elif job in floors:
+            write_json(floors_file(results, floors[job]), {"env": floors[job], "floors": found})
         else:
-            trial = by_name[name]
-            write_trial(results, trial, out, done[trial.name], found)
+            judging[job][0].keep(judging[job][1], found)
+            _write_judged(left, out, results)
+    _write_judged(left, out, results)
     return errors
+
+
+def _write_judged(left: list[Judgements], out: Path, results: Path) -> None:
+    """Write the results of trials that have been judged at all presets, and take these trials off the list."""
+    for each in [each for each in left if not each.missing]:
+        write_trial(results, each.trial, out, each.result, each.found)
+        left.remove(each)
 
 
 def read_results(results: Path, env_id: str) -> tuple[list[dict[str, Any]], dict[str, Any]]:

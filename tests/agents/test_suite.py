@@ -62,21 +62,19 @@ def run(*options, code=0):
     return " ".join(done.output.split())
 
 
+def told(hyperparameters, folder, seeds) -> list:
+    return [
+        "--hyperparameters", hyperparameters, "--seeds", seeds, "--out", folder / "o", "--results", folder / "r",
+    ]  # fmt: skip
+
+
 def test_it_trains_judges_and_writes_once(hyperparameters, here, tmp_path):
-    options = [
-        "--hyperparameters",
-        hyperparameters,
-        "--seeds",
-        "0,1",
-        "--out",
-        tmp_path / "o",
-        "--results",
-        tmp_path / "r",
-    ]
+    options = told(hyperparameters, tmp_path, "0,1")
     output = run(*options)
     assert here == [
         "BlockCurl-v0-ppo-s0", "BlockCurl-v0-ppo-s1",
-        "judge BlockCurl-v0-ppo-s0", "judge BlockCurl-v0-ppo-s1", f"floors of {CURL}",
+        "judge BlockCurl-v0-ppo-s0 at fast", "judge BlockCurl-v0-ppo-s0 at balanced",
+        "judge BlockCurl-v0-ppo-s1 at fast", "judge BlockCurl-v0-ppo-s1 at balanced", f"floors of {CURL}",
     ]  # fmt: skip
     assert "BlockCurl-v0" in output
     kept = json.loads((tmp_path / "r" / "BlockCurl-v0-ppo-s0.json").read_text())
@@ -91,17 +89,31 @@ def test_it_trains_judges_and_writes_once(hyperparameters, here, tmp_path):
     assert here == []  # all is there
 
 
+def test_a_preset_that_is_judged_is_not_judged_again(hyperparameters, here, tmp_path, monkeypatch):
+    """An error at one preset leaves what the others have found; a policy that was trained anew is judged anew."""
+
+    def fails(env, policy, episodes, seed, **arguments):
+        if arguments["accuracy"] == "balanced":
+            raise OSError("no more power")
+        return evaluate(env, policy, episodes, seed, **arguments)
+
+    evaluate = program.evaluate
+    options, written = told(hyperparameters, tmp_path, "0"), tmp_path / "r" / "BlockCurl-v0-ppo-s0.json"
+    with monkeypatch.context() as patch:
+        patch.setattr(program, "evaluate", fails)
+        patch.setattr(program, "measure_floors", lambda env: {})
+        assert "at balanced: OSError: no more power" in run(*options, code=1)
+    assert not written.exists()
+    here.clear()
+    run(*options)
+    assert here == ["judge BlockCurl-v0-ppo-s0 at balanced"]
+    assert list(json.loads(written.read_text())["judged"]) == ["fast", "balanced"]
+    trial = program.make_trials([CURL], [0], {}, None, hyperparameters)[0]
+    assert program.Judgements(tmp_path / "o", trial, {"evaluation": "another"}).missing == ["fast", "balanced"]
+
+
 def test_trials_at_presets_stand_beside_the_others(hyperparameters, here, tmp_path):
-    options = [
-        "--hyperparameters",
-        hyperparameters,
-        "--seeds",
-        "0",
-        "--out",
-        tmp_path / "o",
-        "--results",
-        tmp_path / "r",
-    ]
+    options = told(hyperparameters, tmp_path, "0")
     run(*options, "--accuracy", "fast")
     found, _ = program.read_results(tmp_path / "r", CURL)
     assert [(each["accuracy"], each["is_default"]) for each in found] == [("fast", False)]
