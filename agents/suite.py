@@ -94,7 +94,7 @@ def is_written(path: Path, result: dict[str, Any] | None = None) -> bool:
 
 
 class Judgements:
-    """What a complete trial's policy reaches at each preset, kept in the folder of its run as soon as it is known.
+    """Success of a complete trial's policy at each preset, kept in the folder of its run as soon as it is known.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class Judgements:
 def write_results(trials: Sequence[Trial], out: Path, results: Path, place: Place, console: Console) -> list[str]:
     """Judge complete trials and measure floors that are not yet written, on the launcher; returns errors.
 
-    A preset of a trial is a job: one that is ended loses no more than this.
+    Each preset of a trial is a job of its own, and an interruption loses those that run.
     """
     done = complete(trials, out)
     left = [Judgements(out, t, done[t.name]) for t in trials

@@ -288,6 +288,22 @@ CONTACT_SOLVER = [
         "kernels/test_sweeps.py::test_the_assembled_problem_is_the_dense_one",
     ),
     _mutant(
+        "holding-cone",
+        "Forces that hold a body may be outside their friction cones by a fiftieth.",
+        "contact_solver/holding.py",
+        "if size <= mu * y:",
+        "if size <= 1.02 * mu * y:",
+        "physics/test_holding.py::test_a_block_holds_to_the_limit_of_friction[precise]",
+    ),
+    _mutant(
+        "holding-never",
+        "A body at rest on four contacts is not asked whether it can hold.",
+        "contact_solver/holding.py",
+        "if n < 3 or",
+        "if n < 5 or",
+        "physics/test_holding.py::test_a_block_holds_to_the_limit_of_friction[precise]",
+    ),
+    _mutant(
         "contact-solver-target",
         "The target of one of two contacts counts twice.",
         "contact_solver/contact_pair.py",

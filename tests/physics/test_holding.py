@@ -92,6 +92,19 @@ def test_many_loads_hold(accuracy):
 
 
 @pytest.mark.exhaustive
+@pytest.mark.parametrize("accuracy", ["fast", "balanced"])
+def test_time_stepping_holds_four_fifths(accuracy):
+    """300 loads at 80 % of the limit. Above it the sharing of the load that the solver takes may let some slide."""
+    rng = np.random.default_rng(4)
+    for _ in range(300):
+        yaw = rng.uniform(0.0, np.pi)
+        pressing, growing = random_load(rng, yaw)
+        underside = corners(yaw)[corners(yaw)[:, 1] < 0]
+        limit = largest_share(underside, np.tile(UP, (4, 1)), FRICTION, pressing + WEIGHT, growing)
+        assert speed_after(resting_block(accuracy, yaw), pressing + 0.8 * limit * growing) == 0.0
+
+
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("accuracy", ["precise", "reference"])
 def test_it_holds_in_a_corner(accuracy):
     """A block pressed against a wall, too: six corners at two walls share the load."""

@@ -1,4 +1,4 @@
-"""How much of a load dry friction can hold: limit analysis by a linear program, for any contacts."""
+"""Limit of a load that dry friction can hold, at any contacts, by a linear program."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 DIRECTIONS = 512
-"""Of tangential forces at each contact. The polygon inside a disk leaves out 1 - cos(π/512) = 1.9e-5 of its radius."""
+"""Number of tangential forces at each contact. The polygon inside a disk leaves out 1 - cos(π/512) = 1.9e-5 of its radius."""
 
 
 def tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
