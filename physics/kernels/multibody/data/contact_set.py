@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.compliance import is_pressed_in
 from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
+from physics.kernels.multibody.data.driven_faces import driven_owner
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.grain import grain_tangents
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -295,8 +296,8 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     feature : int
         Number of the touching features of this pair: below `FEATURES_PER_PAIR` unless one of the two is a hull.
     owner : int
-        Body or part that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass each other,
-        and each body keeps a point of its own.
+        Body or part that the normal turns with; -1: none, unless `driven_owner` finds one; `PARTED`: the normal parts
+        two bodies that pass each other, and each body keeps a point of its own.
     normal : tuple of 3 floats
         Unit vector out of b, world frame.
     points : pair of tuples of 3 floats
@@ -314,6 +315,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
         return False
     one, other, normal, points = lower_body_first(a, b, normal, points, many)
     one, other, normal, points = moving_first(one, other, normal, points, many)
+    owner = driven_owner(one, other, owner, normal, many)
     a, b = body_of(one, many), body_of(other, many)
     end = end_of(b, many)
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, end

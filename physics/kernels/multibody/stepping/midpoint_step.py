@@ -42,6 +42,7 @@ from physics.kernels.multibody.data.driven_bodies import (
     note_stage_work,
     take_later_velocities,
 )
+from physics.kernels.multibody.data.driven_faces import coriolis_of_owner
 from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
 from physics.kernels.multibody.data.kinematics import move_driven_bodies, update_body_pose
 from physics.kernels.multibody.data.parts import (
@@ -142,7 +143,7 @@ def _coriolis(k, many):
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
         return 0.0
-    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, body_of(owner, many), 3), slip_velocity(k, many)))
+    return coriolis_of_owner(k, owner, n, slip_velocity(k, many), many)
 
 
 @if_given("many.bodies.fixed", 0.0)
