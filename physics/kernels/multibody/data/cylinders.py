@@ -48,9 +48,9 @@ SINGLE_FEATURE = BESIDE_FEATURE + 2
 # Square of the sine of the tilt of a cylinder below which no rim point is the lowest: rounding of unit vectors.
 _LEAST_SINE_SQUARED = 1.0e-30
 
-# Square of the sine s below which rounding is taken off the part of a vector across the axis once more. It leaves
-# 2.2e-16 of the vector in it, along the axis. On a rim of radius r this is 2.2e-16 r/s: 2.2e-10 r, less than a slop.
-_CLEARED_SINE_SQUARED = 1.0e-12
+# Square of the sine s below which rounding is taken off the part of a vector across the axis once more. It leaves up to
+# 1e-15 of the vector in it, along the axis. On a rim of radius r this is 1e-15 r/s: 1e-10 r, far less than a slop.
+_CLEARED_SINE_SQUARED = 1.0e-10
 
 
 @if_given("many.bodies.cylinders", False)

@@ -40,6 +40,10 @@ _CORRECTION_SHARE = 0.5
 _MAX_ROUNDS = 30
 _DEEP_SLOPS = 100.0
 
+# Largest gain of a body by its turn in the air that is not taken from its motion, as a share of its rotational energy.
+# Depths halve from one correction to the next, and so do these gains: together they are that of a resting stage.
+_FREE_TURN_SHARE = 0.5 * ENERGY_GAIN_TOLERANCE
+
 # Largest gain of two bodies without relative motion that is not taken from them, as a share of their rotational energy.
 _FREE_SPIN_SHARE = 1.0e-6
 
@@ -212,7 +216,7 @@ def _displace(b, offset_frame, many):
     write_state(many.bodies.state, b, (x, q, v, L))
     if not _is_held(b, many):
         gain = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame)) - before
-        many.bodies.momenta[b, TURN_GAIN] = gain if gain > ENERGY_GAIN_TOLERANCE * before else 0.0
+        many.bodies.momenta[b, TURN_GAIN] = gain if gain > _FREE_TURN_SHARE * before else 0.0
         return 0.0
     cap_rotational_energy(b, before, offset_frame, many)
     return work_against_loads(b, start, many)
