@@ -514,6 +514,14 @@ STEPPING = [
         _CASE + "[60-closed-pairs]",
     ),
     _mutant(
+        "stepping-balance",
+        "Checks of energy do not see that the moment of two points apart is balanced.",
+        "stepping/solve_and_apply.py",
+        "        put_vector(many.bodies.twist, body, 3, w)",
+        "        put_vector(many.bodies.free_twist, body, 3, w)",
+        "kernels/test_passing_pairs.py::test_the_moment_of_points_apart_is_balanced_and_the_twists_know_it",
+    ),
+    _mutant(
         "stepping-turn",
         "Bodies that are pushed apart in the air keep the energy that their turn adds.",
         "stepping/position_correction.py",

@@ -161,7 +161,7 @@ class ContactSet(NamedTuple):
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k; below: `fixed_bodies`
     id: np.ndarray  # (contacts,) int, contact name: the same while the same features touch
-    owner: np.ndarray  # (contacts,) int, part that the normal turns with; -1: none; -2: `contact_set.PARTED`
+    owner: np.ndarray  # (contacts,) int, part that the normal turns with; -1: none; see `contact_set.PARTED`
     normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the owner's frame (no owner: world)
     anchor: np.ndarray  # (contacts, 6) contact arms of both bodies, each in its body frame [m]
     frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame

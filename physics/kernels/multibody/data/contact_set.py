@@ -36,6 +36,9 @@ from physics.kernels.state.layout import ELLIPSOID, SPHERE
 # Owner of a contact whose normal is that of a plane between two bodies that pass each other (`stepping.passing_pairs`).
 PARTED = -2
 
+# Owner of such a contact whose impulses at its two points keep their moment, since to balance it would add energy.
+UNBALANCED = -3
+
 # Depth, in slops, that a touching contact must reach to count as stopping its bodies. It is more than 2 √3: so much do
 # two bodies lose along any direction that are thinned by a slop each (`stepping.passing_pairs`).
 DEEP_SHARE = 4.0
@@ -150,12 +153,18 @@ def pair_slop(a, b, many):
 
 
 @inlined
+def is_parted(k, many):
+    """True if the normal of contact k parts two bodies that pass each other."""
+    return many.contacts.owner[k] <= PARTED
+
+
+@inlined
 def parted_slack(k, many):
     """Depth to which contact k may close beyond its gap [m]: `DEEP_SHARE` slops if its owner is `PARTED`, else 0.
 
     The bodies of a `PARTED` contact pass each other, and `stepping.passing_pairs` takes them thinner than they are.
     """
-    if many.contacts.owner[k] != PARTED:
+    if not is_parted(k, many):
         return 0.0
     return DEEP_SHARE * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
 
@@ -411,16 +420,16 @@ def _turn_frame(k, a, b, many):
     if owner >= 0:
         n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
         write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
+    elif b >= 0 and owner > PARTED and many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
         d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
         size = math.sqrt(qt.dot(d, d))
         if size > 0.0:
             n = (d[0] / size, d[1] / size, d[2] / size)
             write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
+    elif b >= 0 and owner > PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
         n = normal_beside_cylinder(k, a, b, n, many)
         write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
+    elif b >= 0 and owner > PARTED and (is_capsule(a, many) or is_capsule(b, many)):
         n = normal_between_axes(k, a, b, n, many)
         write_contact_frame(k, n, many)
     else:
@@ -449,5 +458,5 @@ def update_contacts(many):
         put_vector(many.contacts.arm, k, 3, arm)
         gap = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
         many.contacts.gap[k] = gap
-        if many.contacts.owner[k] != PARTED:
+        if not is_parted(k, many):
             _join_points(k, one, other, many.contacts.owner[k], gap, n, many)

@@ -75,7 +75,11 @@ from physics.kernels.multibody.stepping.lone_stage import (
     mean_slip_target,
     residual_of_lone,
 )
-from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
+from physics.kernels.multibody.stepping.solve_and_apply import (
+    leave_moments,
+    solve_and_apply,
+    solve_frictionless_and_apply,
+)
 from physics.kernels.multibody.stepping.spring_switches import note_switches
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
@@ -332,6 +336,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     foretell_end_gaps(n, after, many)
     if has_gained_energy(n, h, many):
         revert_to_dissipative(n, switches.flight.offset_frame, many)
+        leave_moments(n, many)
         solve_and_apply(n, world, switches.friction, records.report, many)
         foretell_end_gaps(n, after, many)
         if has_friction(switches) and has_gained_energy(n, h, many):
