@@ -179,14 +179,17 @@ def test_a_cylinder_rolls_on_a_table_that_turns_under_it():
 
 
 def test_a_cylinder_stands_and_slides_on_a_fixed_block_as_on_a_wall():
-    """A fixed body stands far from the wall, so that both worlds have the same plan."""
+    """A fixed body stands far from the wall, so that both worlds have the same plan.
+
+    Solves leave ε of the speed g h, so that a place is off by up to ε g h² n²/2 after n steps: 1.2e-8 m.
+    """
     far = physics.Block((1, 1, 1), fixed=True, pos=(0, -50, 0))
     for speed in (0.0, 0.4):
         cylinder = physics.Cylinder(0.1, 0.3, 1.0, pos=(0, 0.15, 0), linvel=(speed, 0, 0.2 * speed))
         on_wall, on_block = world_of(cylinder, far, walls=[FLOOR]), world_of(cylinder, TABLE)
         for world in (on_wall, on_block):
             world.step(steps=10)
-        assert on_block.pos[0, 0] == pytest.approx(on_wall.pos[0, 0], abs=1e-9)
+        assert on_block.pos[0, 0] == pytest.approx(on_wall.pos[0, 0], abs=1.2e-8)
         assert on_block.quat[0, 0] == pytest.approx(on_wall.quat[0, 0], abs=1e-9)
 
 
