@@ -181,8 +181,8 @@ def test_a_cylinder_rolls_on_a_table_that_turns_under_it():
 def test_a_cylinder_stands_and_slides_on_a_fixed_block_as_on_a_wall():
     """A fixed body stands far from the wall, so that both worlds have the same plan.
 
-    Solves leave ε of the speed g h, so a place is off by up to ε g h² n²/2 after n steps: 1.2e-8 m. At the radius of 0.1 m
-    this is an angle of 1.2e-7 rad, half of which is in the quaternion.
+    Solves leave ε of the speed g h, so a place is off by up to ε g h² n²/2 after n steps: 1.2e-8 m. At the radius
+    of 0.1 m this is an angle of 1.2e-7 rad, half of which is in the quaternion.
     """
     far = physics.Block((1, 1, 1), fixed=True, pos=(0, -50, 0))
     for speed in (0.0, 0.4):
