@@ -7,8 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import physics
+from physics.kernels.multibody.data.contact_set import PARTED, UNBALANCED
 from physics.kernels.multibody.narrowphase.gjk import gjk_distance, support_point
 from physics.kernels.multibody.stepping.passing_pairs import _have_point_in_common, _holds_point
+from physics.kernels.multibody.stepping.solve_and_apply import apply_impulses, leave_moments
 from tests.kernels.called import called
 from tests.kernels.test_tumbling import HULL_POINTS
 
@@ -85,3 +87,29 @@ def test_bodies_with_a_point_in_common_are_not_parted_by_any_plane(first, second
             found += 1
             assert called(gjk_distance, 0, 1, now, later, tuple(n), 1e-9, THINNER, hulls, many)[1] == 0.0
     assert found > 3
+
+
+def test_the_moment_of_points_apart_is_balanced_and_the_twists_know_it():
+    """An impulse at two points apart has a moment. Both bodies take it up, unless a solve has added energy by that."""
+    many, _ = scratch_of("block", "sphere")
+    J = [np.zeros((3, 3)) for _ in range(2)]
+    for b in range(2):
+        J[b][np.triu_indices(3)] = many.bodies.inv_inertia[b]
+        J[b] += np.triu(J[b], 1).T
+    p, arms, signs = np.array((3.0, 0.0, 0.0)), np.array([(-1.0, 0.1, 0.2), (0.4, 0.0, 0.0)]), (1.0, -1.0)
+    many.contacts.bodies[0], many.contacts.frame[0] = (0, 1), np.eye(3).ravel()
+    many.contacts.arm[0], many.contacts.impulse[0] = arms.ravel(), p
+    for owner in (PARTED, UNBALANCED):
+        many.contacts.owner[0] = PARTED
+        if owner == UNBALANCED:
+            called(leave_moments, 1, many)
+        assert many.contacts.owner[0] == owner
+        many.bodies.state[:, 7:13] = 0.0
+        for b in range(2):  # as solves leave them
+            many.bodies.twist[b] = *(signs[b] * many.bodies.inv_mass[b] * p), *(J[b] @ np.cross(arms[b], signs[b] * p))
+        called(apply_impulses, 1, many)
+        x, v, L = many.bodies.state[:, :3], many.bodies.state[:, 7:10], many.bodies.state[:, 10:13]
+        np.testing.assert_allclose(many.bodies.twist[:, 3:], [J[b] @ L[b] for b in range(2)], rtol=0, atol=1e-13)
+        moment = (np.cross(x, v / many.bodies.inv_mass[:, None]) + L).sum(axis=0)
+        apart = np.cross(x[0] + arms[0] - x[1] - arms[1], p)
+        np.testing.assert_allclose(moment, apart if owner == UNBALANCED else np.zeros(3), rtol=0, atol=1e-13)

@@ -143,6 +143,14 @@ DATA = [
         "kernels/test_hulls.py::test_a_hull_touches_a_wall_with_the_corners_that_are_near",
     ),
     _mutant(
+        "data-rim-rounding",
+        "A direction along the axis of a cylinder leads to a point beside its rim.",
+        "data/cylinders.py",
+        "    if square > _CLEARED_SINE_SQUARED * whole:",
+        "    if square > 0.0:",
+        "kernels/test_cylinders.py::test_the_point_that_reaches_farthest_is_on_the_cylinder_for_directions_along_its_axis",
+    ),
+    _mutant(
         "data-second-body",
         "The turning of the second body does not count in the relative velocity of a contact.",
         "data/contact_set.py",
@@ -505,6 +513,22 @@ STEPPING = [
         "_add_angular_momentum(a, on_b, turn, many)",
         _CASE + "[60-closed-pairs]",
     ),
+    _mutant(
+        "stepping-balance",
+        "Checks of energy do not see that the moment of two points apart is balanced.",
+        "stepping/solve_and_apply.py",
+        "        put_vector(many.bodies.twist, body, 3, w)",
+        "        put_vector(many.bodies.free_twist, body, 3, w)",
+        "kernels/test_passing_pairs.py::test_the_moment_of_points_apart_is_balanced_and_the_twists_know_it",
+    ),
+    _mutant(
+        "stepping-turn",
+        "Bodies that are pushed apart in the air keep the energy that their turn adds.",
+        "stepping/position_correction.py",
+        "gain += many.bodies.momenta[a, TURN_GAIN] + many.bodies.momenta[b, TURN_GAIN]",
+        "gain += 0.0",
+        "physics/test_collisions.py::test_bodies_that_are_pushed_apart_in_the_air_gain_no_energy",
+    ),
 ]
 
 _MOTION = "physics/test_motion.py::test_"
@@ -549,6 +573,22 @@ DRIVEN = [
         "return plus(plus(v, qt.cross(w, arm)), s)",
         "return plus(v, s)",
         _MOTION + "a_block_stays_on_a_turntable",
+    ),
+    _mutant(
+        "driven-face",
+        "The normal below a ball stays while the driven face turns.",
+        "data/driven_faces.py",
+        "return other if _has_face(other, n, many) else owner",
+        "return owner",
+        "physics/test_driven_faces.py::test_bodies_do_not_sink_in",
+    ),
+    _mutant(
+        "driven-ball",
+        "The spin of a ball moves its contact point on a driven face that turns.",
+        "data/driven_faces.py",
+        "return found - 0.5 * qt.dot(n, more)",
+        "return found",
+        "physics/test_driven_faces.py::test_the_error_is_of_second_order",
     ),
     _mutant(
         "driven-slip",

@@ -179,15 +179,19 @@ def test_a_cylinder_rolls_on_a_table_that_turns_under_it():
 
 
 def test_a_cylinder_stands_and_slides_on_a_fixed_block_as_on_a_wall():
-    """A fixed body stands far from the wall, so that both worlds have the same plan."""
+    """A fixed body stands far from the wall, so that both worlds have the same plan.
+
+    Solves leave ε of the speed g h, so a place is off by up to ε g h² n²/2 after n steps: 1.2e-8 m. At the radius
+    of 0.1 m this is an angle of 1.2e-7 rad, half of which is in the quaternion.
+    """
     far = physics.Block((1, 1, 1), fixed=True, pos=(0, -50, 0))
     for speed in (0.0, 0.4):
         cylinder = physics.Cylinder(0.1, 0.3, 1.0, pos=(0, 0.15, 0), linvel=(speed, 0, 0.2 * speed))
         on_wall, on_block = world_of(cylinder, far, walls=[FLOOR]), world_of(cylinder, TABLE)
         for world in (on_wall, on_block):
             world.step(steps=10)
-        assert on_block.pos[0, 0] == pytest.approx(on_wall.pos[0, 0], abs=1e-9)
-        assert on_block.quat[0, 0] == pytest.approx(on_wall.quat[0, 0], abs=1e-9)
+        assert on_block.pos[0, 0] == pytest.approx(on_wall.pos[0, 0], abs=1.2e-8)
+        assert on_block.quat[0, 0] == pytest.approx(on_wall.quat[0, 0], abs=6e-8)
 
 
 def carried(share: float, direction: float, is_fixed: bool) -> float:

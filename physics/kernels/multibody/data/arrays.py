@@ -34,6 +34,9 @@ from physics.kernels.multibody.data.parts import Parts
 # velocity and angular momentum after the loads have acted.
 PRE_LOAD_VELOCITY, LOADED_MOMENTA = 0, 6
 
+# Column of `many.bodies.momenta` during a position correction: energy that the turn of a body has added.
+TURN_GAIN = 0
+
 # Contacts that two bodies may have at once: a rectangle clipped by another one has up to eight vertices.
 PAIR_CONTACTS = 8
 
@@ -117,7 +120,8 @@ class Bodies(NamedTuple):
     twist: np.ndarray  # (bodies, 6) velocity and angular velocity, world frame [m/s, rad/s]
     free_twist: np.ndarray  # (bodies, 6) twist without contact impulses [m/s, rad/s]
     momenta: np.ndarray  # (bodies, 12) in a resting stage: `PRE_LOAD_VELOCITY`, `LOADED_MOMENTA`; in
-    # `stepping.restitution_energy`: velocity and angular momentum before an impact, then after its full rebound
+    # `stepping.restitution_energy`: velocity and angular momentum before an impact, then after its full rebound; in
+    # `stepping.position_correction`: `TURN_GAIN`
     center: np.ndarray  # (parts, 3) geometric centre, world frame [m]
     box: np.ndarray  # (bodies, 6) lower, then upper corner of the swept box, world frame [m]
     touched: np.ndarray  # (bodies,) int, 1: the body is in a contact of this stage
@@ -157,7 +161,7 @@ class ContactSet(NamedTuple):
 
     bodies: np.ndarray  # (contacts, 2) int, first and second body; -1 - k: wall k; below: `fixed_bodies`
     id: np.ndarray  # (contacts,) int, contact name: the same while the same features touch
-    owner: np.ndarray  # (contacts,) int, part that the normal turns with; -1: none; -2: `contact_set.PARTED`
+    owner: np.ndarray  # (contacts,) int, part that the normal turns with; -1: none; see `contact_set.PARTED`
     normal: np.ndarray  # (contacts, 3) unit vector out of the second body, in the owner's frame (no owner: world)
     anchor: np.ndarray  # (contacts, 6) contact arms of both bodies, each in its body frame [m]
     frame: np.ndarray  # (contacts, 9) rows normal, tangent 1, tangent 2, world frame

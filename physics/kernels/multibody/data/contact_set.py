@@ -17,6 +17,7 @@ from physics.kernels.multibody.data.compliance import is_pressed_in
 from physics.kernels.multibody.data.cylinder_balls import ball_arm, is_beside_cylinder, normal_beside_cylinder
 from physics.kernels.multibody.data.cylinders import is_cylinder, rolling_arm
 from physics.kernels.multibody.data.driven_bodies import moving_body_at, relative_to_driven, take_driven_velocity
+from physics.kernels.multibody.data.driven_faces import driven_owner
 from physics.kernels.multibody.data.fixed_bodies import body_at, end_of, moving_first
 from physics.kernels.multibody.data.grain import grain_tangents
 from physics.kernels.multibody.data.pair_materials import pair_coefficients
@@ -34,6 +35,9 @@ from physics.kernels.state.layout import ELLIPSOID, SPHERE
 
 # Owner of a contact whose normal is that of a plane between two bodies that pass each other (`stepping.passing_pairs`).
 PARTED = -2
+
+# Owner of such a contact whose impulses at its two points keep their moment, since to balance it would add energy.
+UNBALANCED = -3
 
 # Depth, in slops, that a touching contact must reach to count as stopping its bodies. It is more than 2 √3: so much do
 # two bodies lose along any direction that are thinned by a slop each (`stepping.passing_pairs`).
@@ -149,12 +153,18 @@ def pair_slop(a, b, many):
 
 
 @inlined
+def is_parted(k, many):
+    """True if the normal of contact k parts two bodies that pass each other."""
+    return many.contacts.owner[k] <= PARTED
+
+
+@inlined
 def parted_slack(k, many):
     """Depth to which contact k may close beyond its gap [m]: `DEEP_SHARE` slops if its owner is `PARTED`, else 0.
 
     The bodies of a `PARTED` contact pass each other, and `stepping.passing_pairs` takes them thinner than they are.
     """
-    if many.contacts.owner[k] != PARTED:
+    if not is_parted(k, many):
         return 0.0
     return DEEP_SHARE * pair_slop(many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many)
 
@@ -295,8 +305,8 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
     feature : int
         Number of the touching features of this pair: below `FEATURES_PER_PAIR` unless one of the two is a hull.
     owner : int
-        Body or part that the normal turns with; -1: none; `PARTED`: the normal parts two bodies that pass each other,
-        and each body keeps a point of its own.
+        Body or part that the normal turns with; -1: none, unless `driven_owner` finds one; `PARTED`: the normal parts
+        two bodies that pass each other, and each body keeps a point of its own.
     normal : tuple of 3 floats
         Unit vector out of b, world frame.
     points : pair of tuples of 3 floats
@@ -314,6 +324,7 @@ def add_contact(a, b, feature, owner, normal, points, gap, h, many):
         return False
     one, other, normal, points = lower_body_first(a, b, normal, points, many)
     one, other, normal, points = moving_first(one, other, normal, points, many)
+    owner = driven_owner(one, other, owner, normal, many)
     a, b = body_of(one, many), body_of(other, many)
     end = end_of(b, many)
     many.contacts.bodies[k, 0], many.contacts.bodies[k, 1] = a, end
@@ -409,16 +420,16 @@ def _turn_frame(k, a, b, many):
     if owner >= 0:
         n = qt.matvec(row_matrix(many.bodies.rotation, owner), n)
         write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
+    elif b >= 0 and owner > PARTED and many.bodies.body[a].shape == SPHERE == many.bodies.body[b].shape:
         d = subtract(row_vector(many.bodies.center, a, 0), row_vector(many.bodies.center, b, 0))
         size = math.sqrt(qt.dot(d, d))
         if size > 0.0:
             n = (d[0] / size, d[1] / size, d[2] / size)
             write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
+    elif b >= 0 and owner > PARTED and (is_cylinder(a, many) or is_cylinder(b, many)):
         n = normal_beside_cylinder(k, a, b, n, many)
         write_contact_frame(k, n, many)
-    elif b >= 0 and owner != PARTED and (is_capsule(a, many) or is_capsule(b, many)):
+    elif b >= 0 and owner > PARTED and (is_capsule(a, many) or is_capsule(b, many)):
         n = normal_between_axes(k, a, b, n, many)
         write_contact_frame(k, n, many)
     else:
@@ -447,5 +458,5 @@ def update_contacts(many):
         put_vector(many.contacts.arm, k, 3, arm)
         gap = qt.dot(n, subtract(point, add_scaled(arm, 1.0, row_vector(many.bodies.state, b, 0))))
         many.contacts.gap[k] = gap
-        if many.contacts.owner[k] != PARTED:
+        if not is_parted(k, many):
             _join_points(k, one, other, many.contacts.owner[k], gap, n, many)

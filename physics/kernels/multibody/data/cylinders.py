@@ -48,6 +48,10 @@ SINGLE_FEATURE = BESIDE_FEATURE + 2
 # Square of the sine of the tilt of a cylinder below which no rim point is the lowest: rounding of unit vectors.
 _LEAST_SINE_SQUARED = 1.0e-30
 
+# Square of the sine s below which rounding is taken off the part of a vector across the axis once more. It leaves up to
+# 1e-15 of the vector in it, along the axis. On a rim of radius r this is 1e-15 r/s: 1e-10 r, far less than a slop.
+_CLEARED_SINE_SQUARED = 1.0e-10
+
 
 @if_given("many.bodies.cylinders", False)
 def is_cylinder(b, many):
@@ -78,6 +82,22 @@ def across_axis(axis, k):
 
 
 @inlined
+def _towards_rim(axis, k):
+    """Part p of the vector k across the unit vector `axis`, and p·p: 0 if k is along the axis up to rounding.
+
+    If k is nearly along the axis, rounding in p may be as long as p and along the axis, so that a point of a rim in the
+    direction of p would be off the cylinder.
+    """
+    p, whole = across_axis(axis, k), qt.dot(k, k)
+    square = qt.dot(p, p)
+    if square > _CLEARED_SINE_SQUARED * whole:
+        return p, square
+    p = across_axis(axis, p)
+    square = qt.dot(p, p)
+    return p, square if square > _LEAST_SINE_SQUARED * whole else 0.0
+
+
+@inlined
 def cylinder_support(b, R, k, many):
     """Support function of cylinder b for a vector k of any length [m]: l |k·y| + r |k - (k·y) y|, with its axis y."""
     d, y = many.bodies.body[b].dims, axis_of(R)
@@ -98,8 +118,7 @@ def cylinder_support_arm(dims, R, k):
     `dims` are its half extents, of which the first two are read.
     """
     y = axis_of(R)
-    arm, p = times(math.copysign(dims[1], qt.dot(y, k)), y), across_axis(y, k)
-    square = qt.dot(p, p)
+    arm, (p, square) = times(math.copysign(dims[1], qt.dot(y, k)), y), _towards_rim(y, k)
     return plus(arm, times(dims[0] / math.sqrt(square), p)) if square > 0.0 else arm
 
 
@@ -110,9 +129,8 @@ def rolling_arm(b, place, R, k, many):
     `place` is that of the cross-section on the axis, from the centre [m]; vectors are in the world frame. Where all
     points of the circle reach equally far, it is the centre of the circle.
     """
-    arm, p = times(place, axis_of(R)), across_axis(axis_of(R), k)
-    square = qt.dot(p, p)
-    return plus(arm, times(many.bodies.body[b].dims[0] / math.sqrt(square), p)) if square > _LEAST_SINE_SQUARED else arm
+    arm, (p, square) = times(place, axis_of(R)), _towards_rim(axis_of(R), k)
+    return plus(arm, times(many.bodies.body[b].dims[0] / math.sqrt(square), p)) if square > 0.0 else arm
 
 
 @inlined
@@ -130,9 +148,8 @@ def rolling_arm_rate(b, place, R, w, k, many):
     """
     d, y = many.bodies.body[b].dims, axis_of(R)
     turn = qt.cross(w, y)
-    rate, p = times(place, turn), across_axis(y, k)
-    square = qt.dot(p, p)
-    if not square > _LEAST_SINE_SQUARED:
+    rate, (p, square) = times(place, turn), _towards_rim(y, k)
+    if not square > 0.0:
         return rate
     change = minus(times(-qt.dot(k, turn), y), times(qt.dot(k, y), turn))
     change = minus(change, times(qt.dot(change, p) / square, p))

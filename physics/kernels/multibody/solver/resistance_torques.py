@@ -33,7 +33,7 @@ from physics.kernels.math import quaternion as qt
 from physics.kernels.math.full_pivot_solve import solve_full_pivot
 from physics.kernels.math.vector import minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import TORQUE_HISTORY
-from physics.kernels.multibody.data.contact_set import PARTED, put_vector
+from physics.kernels.multibody.data.contact_set import is_parted, put_vector
 from physics.kernels.multibody.data.cylinders import is_cylinder
 from physics.kernels.multibody.data.driven_bodies import moving_body_at
 from physics.kernels.multibody.data.fixed_bodies import body_at
@@ -82,7 +82,7 @@ def _resists(k, many):
 
     A cylinder is round where its rims or its side roll, and may spin on a face.
     """
-    if many.contacts.owner[k] == PARTED:
+    if is_parted(k, many):
         return False
     b = body_at(many.contacts.bodies[k, 1], many)
     return _is_round_at(k, b, many) or may_roll(k, many) or _is_on_face(k, many)

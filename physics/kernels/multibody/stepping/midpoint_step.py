@@ -42,6 +42,7 @@ from physics.kernels.multibody.data.driven_bodies import (
     note_stage_work,
     take_later_velocities,
 )
+from physics.kernels.multibody.data.driven_faces import coriolis_of_owner
 from physics.kernels.multibody.data.fixed_bodies import body_at, has_fixed
 from physics.kernels.multibody.data.kinematics import move_driven_bodies, update_body_pose
 from physics.kernels.multibody.data.parts import (
@@ -74,7 +75,11 @@ from physics.kernels.multibody.stepping.lone_stage import (
     mean_slip_target,
     residual_of_lone,
 )
-from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
+from physics.kernels.multibody.stepping.solve_and_apply import (
+    leave_moments,
+    solve_and_apply,
+    solve_frictionless_and_apply,
+)
 from physics.kernels.multibody.stepping.spring_switches import note_switches
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state, write_state
@@ -142,7 +147,7 @@ def _coriolis(k, many):
     owner, n = many.contacts.owner[k], row_vector(many.contacts.frame, k, 0)
     if owner < 0:
         return 0.0
-    return qt.dot(n, qt.cross(row_vector(many.bodies.twist, body_of(owner, many), 3), slip_velocity(k, many)))
+    return coriolis_of_owner(k, owner, n, slip_velocity(k, many), many)
 
 
 @if_given("many.bodies.fixed", 0.0)
@@ -331,6 +336,7 @@ def step_under_held_loads(n, world, h, switches, sleep, records, many):
     foretell_end_gaps(n, after, many)
     if has_gained_energy(n, h, many):
         revert_to_dissipative(n, switches.flight.offset_frame, many)
+        leave_moments(n, many)
         solve_and_apply(n, world, switches.friction, records.report, many)
         foretell_end_gaps(n, after, many)
         if has_friction(switches) and has_gained_energy(n, h, many):

@@ -10,9 +10,11 @@ from __future__ import annotations
 import math
 
 from physics.compiler.decorators import inlined, kernel, shared_kernel
+from physics.kernels.contact_law.compliance import ENERGY_GAIN_TOLERANCE
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.union_find import find_root
 from physics.kernels.math.vector import row_vector
+from physics.kernels.multibody.data.arrays import TURN_GAIN
 from physics.kernels.multibody.data.contact_set import add_scaled, pair_slop, put_vector, subtract, update_contacts
 from physics.kernels.multibody.data.kinematics import update_body_pose
 from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
@@ -37,6 +39,10 @@ _CORRECTION_SHARE = 0.5
 # helped. Loads of a million times the weight may turn bodies deep into others, and these are moved out at once.
 _MAX_ROUNDS = 30
 _DEEP_SLOPS = 100.0
+
+# Largest gain of a body by its turn in the air that is not taken from its motion, as a share of its rotational energy.
+# Depths halve from one correction to the next, and so do these gains: together they are that of a resting stage.
+_FREE_TURN_SHARE = 0.5 * ENERGY_GAIN_TOLERANCE
 
 # Largest gain of two bodies without relative motion that is not taken from them, as a share of their rotational energy.
 _FREE_SPIN_SHARE = 1.0e-6
@@ -177,14 +183,18 @@ def _spin_energy(b, many):
 
 @kernel
 def _pay_for_spins(n, offset_frame, many):
-    """Take the energy that `_keep_angular_momentum` has added from the relative motion of the bodies.
+    """Take the energy that `_keep_angular_momentum` and turns have added from the relative motion of the bodies.
 
-    If the relative motion has too little, and the energy is not negligible, it is taken from the motion of both bodies,
-    which changes their momentum.
+    A body's gain by its turn is taken at the first of its contacts that has pushed it. If the relative motion has too
+    little, and the energy is not negligible, it is taken from the motion of both bodies, which changes their momentum.
     """
     for k in range(n):
         a, b, gain = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], many.contacts.rebound_impulse[k, 0]
-        if b < 0 or not gain > 0.0 or _take_relative_energy(a, b, gain, many):
+        if b < 0 or not many.contacts.impulse[k, 0] > 0.0:
+            continue
+        gain += many.bodies.momenta[a, TURN_GAIN] + many.bodies.momenta[b, TURN_GAIN]
+        many.bodies.momenta[a, TURN_GAIN] = many.bodies.momenta[b, TURN_GAIN] = 0.0
+        if not gain > 0.0 or _take_relative_energy(a, b, gain, many):
             continue
         one, other = _spin_energy(a, many), _spin_energy(b, many)
         if gain > _FREE_SPIN_SHARE * (one + other):
@@ -196,14 +206,17 @@ def _pay_for_spins(n, offset_frame, many):
 def _displace(b, offset_frame, many):
     """Move and turn body b by the displacement in `many.bodies.twist`; return the work against its loads [J].
 
-    The work is 0 if no wall pushes the island of b.
+    The work is 0 if no wall pushes the island of b. There b keeps its angular momentum L, and what ½ L·I⁻¹L gains is
+    stored for `_pay_for_spins`, unless it is negligible.
     """
     x, q, v, L = read_state(many.bodies.state, b)
     start, before = x, 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame))
     turn = qt.exp_map(row_vector(many.bodies.twist, b, 3))
-    x = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0))
-    write_state(many.bodies.state, b, (x, qt.normalise(qt.multiply(turn, q)), v, L))
+    x, q = add_scaled(x, 1.0, row_vector(many.bodies.twist, b, 0)), qt.normalise(qt.multiply(turn, q))
+    write_state(many.bodies.state, b, (x, q, v, L))
     if not _is_held(b, many):
+        gain = 0.5 * qt.dot(L, angular_velocity(q, L, many.bodies.body[b], offset_frame)) - before
+        many.bodies.momenta[b, TURN_GAIN] = gain if gain > _FREE_TURN_SHARE * before else 0.0
         return 0.0
     cap_rotational_energy(b, before, offset_frame, many)
     return work_against_loads(b, start, many)
@@ -214,7 +227,7 @@ def _displace_all(offset_frame, many):
     """Move and turn all pushed bodies; take the work of lifting from the kinetic energy of the lifted bodies."""
     total = ups = free = 0.0
     for b in range(many.bodies.state.shape[0]):
-        many.bodies.lift_work[b] = 0.0
+        many.bodies.lift_work[b] = many.bodies.momenta[b, TURN_GAIN] = 0.0
         if many.bodies.touched[b] == 0:
             continue
         free += free_lift_work(b, many)

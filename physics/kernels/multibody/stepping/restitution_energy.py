@@ -9,7 +9,11 @@ from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import add_scaled, put_vector
 from physics.kernels.multibody.data.driven_bodies import driven_work
 from physics.kernels.multibody.stepping.bouncing import aims_along, clear_tangential_target
-from physics.kernels.multibody.stepping.solve_and_apply import solve_and_apply, solve_frictionless_and_apply
+from physics.kernels.multibody.stepping.solve_and_apply import (
+    leave_moments,
+    solve_and_apply,
+    solve_frictionless_and_apply,
+)
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import angular_velocity, read_state
 from physics.kernels.state.fixed_body import is_fixed
@@ -122,6 +126,7 @@ def _apply_frictionless(n, offset_frame, many):
     """
     _set_plastic_targets(n, many)
     _update_twists(offset_frame, many)
+    leave_moments(n, many)
     solve_frictionless_and_apply(n, many)
 
 

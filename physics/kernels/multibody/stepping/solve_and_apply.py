@@ -5,8 +5,16 @@ from __future__ import annotations
 from physics.compiler.decorators import inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import row_vector
-from physics.kernels.multibody.data.contact_set import PARTED, add_scaled, put_vector, row_matrix, subtract
+from physics.kernels.multibody.data.contact_set import (
+    PARTED,
+    UNBALANCED,
+    add_scaled,
+    put_vector,
+    row_matrix,
+    subtract,
+)
 from physics.kernels.multibody.data.driven_bodies import aim_at_driven_ends, aim_at_relative_velocities
+from physics.kernels.multibody.solver.contact_operator import apply_body_inv_inertia
 from physics.kernels.multibody.solver.resistance_torques import (
     apply_resistance,
     drop_resistance,
@@ -15,6 +23,14 @@ from physics.kernels.multibody.solver.resistance_torques import (
 from physics.kernels.multibody.solver.solve import solve_all_frictionless
 from physics.kernels.state import layout as at
 from physics.kernels.state.body import report_solve
+
+
+@inlined
+def leave_moments(n, many):
+    """Let the n contacts keep the moments that `_balance_moments` would take, after a solve that has added energy."""
+    for k in range(n):
+        if many.contacts.owner[k] == PARTED:
+            many.contacts.owner[k] = UNBALANCED
 
 
 @inlined
@@ -55,7 +71,7 @@ def _balance_moments(k, a, b, p, many):
 
     The impulse p at one point and -p at the other have a moment together, which would change the total angular
     momentum. Both bodies take up a part of it, in proportion to their m r² (mass, bounding radius). At contacts that
-    are not `PARTED` both points coincide.
+    are not `PARTED` both points coincide. Twists change with them, so that checks of energy see the change.
     """
     x = add_scaled(row_vector(many.bodies.state, a, at.POS), 1.0, row_vector(many.contacts.arm, k, 0))
     y = add_scaled(row_vector(many.bodies.state, b, at.POS), 1.0, row_vector(many.contacts.arm, k, 3))
@@ -65,6 +81,8 @@ def _balance_moments(k, a, b, p, many):
     for body, part in ((a, share), (b, 1.0 - share)):
         L = row_vector(many.bodies.state, body, at.ANGMOM)
         put_vector(many.bodies.state, body, at.ANGMOM, add_scaled(L, -part, moment))
+        w = add_scaled(row_vector(many.bodies.twist, body, 3), -part, apply_body_inv_inertia(body, moment, many))
+        put_vector(many.bodies.twist, body, 3, w)
 
 
 @kernel
