@@ -153,6 +153,30 @@ def _approach(part, start, goal, limit, many):
     return 0
 
 
+def _not_continued(part, friction, residual, goal, many):
+    return 0, residual
+
+
+@if_given("many.foretold", _not_continued)
+def _continue_solution(part, friction, residual, goal, many):
+    """Take Newton's method from the warm start: (Newton steps, residual [m/s]); arguments as of `newton_contacts`.
+
+    Faces rest on more corners than they need, so that a problem has many solutions. Under error control the one nearest
+    to the stage before is wanted: a part and its halves would differ by any other choice.
+    """
+    return newton_contacts(part, friction, residual, goal, _NEWTON_STEPS[0], NEWTON_RHO[0], many)
+
+
+def _all_sweeps(limit, many):
+    return limit
+
+
+@if_given("many.foretold", _all_sweeps)
+def _last_sweeps(limit, many):
+    """Largest number of sweeps after all other methods, at most `limit`: a part without a solution is soon refused."""
+    return min(limit, _FALLBACK_SWEEPS)
+
+
 @kernel
 def alternate_second_order(part, friction, scale, residual, goal, limit, many):
     """Improve the impulses of an island by interior-point and Newton's method in turns: (iterations, residual [m/s]).
@@ -254,12 +278,16 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
         residual = try_all_sticking(part, friction, residual, deep, many)
         if residual <= goal:
             return 1 + count, residual, METHOD_NEWTON
+    more, residual = _continue_solution(part, friction, residual, goal, many)
+    count += more
+    if residual <= goal:
+        return 1 + count, residual, METHOD_NEWTON
     more, residual = alternate_second_order(
         part, friction, scale, residual, goal, max(1, steps - FIRST_SWEEPS - 1), many
     )
     count += 1 + more
     if residual > goal:
-        more, residual = sweep_as_fallback(part, friction, residual, goal, limit, many)
+        more, residual = sweep_as_fallback(part, friction, residual, goal, _last_sweeps(limit, many), many)
         count += more
     return count, residual, METHOD_NEWTON
 
