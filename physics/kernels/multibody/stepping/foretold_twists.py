@@ -93,21 +93,6 @@ def foretell_twists_of_several(n, world, h, switches, memory, many):
             _foretell_body(n, b, world, h, switches.flight.offset_frame, memory, many)
 
 
-@inlined
-def _exchange(b, many):
-    for c in range(6):
-        many.bodies.twist[b, c], many.foretold.twist[b, c] = many.foretold.twist[b, c], many.bodies.twist[b, c]
-
-
-@if_given("many.foretold")
-def exchange_twists_of_several(k, is_error_controlled, many):
-    """Exchange the present twists of the bodies in contact k and the foretold ones, if `is_error_controlled` is 1."""
-    if is_error_controlled == 1:
-        _exchange(many.contacts.bodies[k, 0], many)
-        if many.contacts.bodies[k, 1] >= 0:
-            _exchange(many.contacts.bodies[k, 1], many)
-
-
 @if_given("many.foretold")
 def note_substep(h, many):
     """Note the length h of a substep [s], before its parts are stepped."""

@@ -25,7 +25,6 @@ from physics.kernels.multibody.data.contact_set import put_vector, relative_velo
 from physics.kernels.multibody.data.lone_body import lone_body
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
 from physics.kernels.multibody.stepping.foretold_twists import (
-    exchange_twists_of_several,
     foretell_twists_of_several,
     longest_stage,
 )
@@ -101,19 +100,14 @@ def foretell_twist(n, world, h, switches, memory, many):
         _foretell(n, world, h, switches, memory, many)
 
 
-def _exchange_of_several(k, is_error_controlled, many):
-    exchange_twists_of_several(k, is_error_controlled, many)
-
-
-@if_given("many.lone", _exchange_of_several)
-def exchange_twists(k, is_error_controlled, many):
-    """Exchange the present twists of the bodies in contact k and the foretold ones, under error control.
+@if_given("many.lone")
+def exchange_twists(b, is_error_controlled, many):
+    """Exchange the present twist of the lone body b and the foretold one, under error control.
 
     In longer stages the foretold twist would be the less accurate one where contacts come and go.
     """
     if many.settings[0].is_error_controlled != is_error_controlled or many.lone.slow[0] == 1:
         return
-    b = many.contacts.bodies[k, 0]
     for c in range(6):
         many.bodies.twist[b, c], many.lone.later[0, c] = many.lone.later[0, c], many.bodies.twist[b, c]
 

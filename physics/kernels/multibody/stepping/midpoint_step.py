@@ -172,10 +172,10 @@ def _turning(k, b, h, many):
     if b >= 0:
         c = subtract(c, _centripetal(other, k, 3, 1.0, h, many))
     t = qt.matvec(row_matrix(many.contacts.frame, k), (-half * c[0], -half * c[1], -half * c[2]))
-    exchange_twists(k, 0, many)
+    exchange_twists(many.contacts.bodies[k, 0], 0, many)
     t = (t[0] - half * _turn_of_line(one, other, many), t[1], t[2])
     t = less_turn_of_axes(k, one, other, half, t, many)
-    exchange_twists(k, 0, many)
+    exchange_twists(many.contacts.bodies[k, 0], 0, many)
     t = less_turn_beside_cylinder(k, one, other, half, t, many)
     if many.settings[0].is_error_controlled == 1 or has_fixed(many):
         t = (t[0] + h * _coriolis(k, many), t[1], t[2])
@@ -196,9 +196,9 @@ def set_resting_targets(n, h, many):
     for k in range(n):
         a, b = many.contacts.bodies[k, 0], moving_body_at(many.contacts.bodies[k, 1], many)
         slop = pair_slop(a, b, many)
-        exchange_twists(k, 1, many)
+        exchange_twists(a, 1, many)
         t = _turning(k, b, h, many)
-        exchange_twists(k, 1, many)
+        exchange_twists(a, 1, many)
         gap = many.contacts.gap[k]
         if many.settings[0].is_error_controlled == 1 or has_fixed(many) or has_cylinders(many):
             gap += 0.5 * half * (t[0] + driven_gain(k, many))
