@@ -125,8 +125,7 @@ class ManyBodies(Scheme):
         """
         if not self.is_error_controlled:
             return accuracy
-        tolerance = max(accuracy.tolerance, MIN_SOLVER_TOLERANCE)
-        slop = max(accuracy.slop, min(tolerance, LONE_RELATIVE_SLOP))
+        tolerance, slop = max(accuracy.tolerance, MIN_SOLVER_TOLERANCE), max(accuracy.slop, MIN_RELATIVE_SLOP)
         return replace(accuracy, tolerance=tolerance, slop=slop)
 
     def arguments(self, worlds: Worlds, k: int) -> tuple:

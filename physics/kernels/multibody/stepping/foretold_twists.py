@@ -1,7 +1,12 @@
-"""Twists of several bodies that are foretold for the end of a stage under error control.
+"""Targets of a resting stage of several bodies under error control: smooth, and of second order where a slip turns.
 
-A stage is foretold to have the forces of the stage before. Where contacts of that one are no longer there, or it was
-much shorter, a body is foretold to keep its twist.
+Friction opposes the mean slip where a slip is foretold to go on and to turn (`lone_stage.mean_slip_target`). For that a
+stage is foretold to have the forces of the stage before. Where contacts of that one are no longer there, or it was much
+shorter, a body is foretold to keep its twist.
+
+A face rests on more corners than it needs, so that its contact problem has no solution unless its targets are those of
+a rigid motion. Three rules keep them so: gaps and overlaps close alike, contacts that push stay in contact, and targets
+are not clamped one by one. Gaps close in the time of the substep: in that of a short part, rounding would be a speed.
 
 All of this is left out of kernels without error control, of those of a lone body (`lone_stage`), and of those with
 compliant contact, whose parts are extrapolated.
@@ -127,7 +132,7 @@ def _never(k, many):
 def is_held(k, many):
     """True if contact k has pushed in the stage before: then it stays in contact, whatever its gap at the middle is.
 
-    The gap is an error of third order in the length of the stage. Loads the warm start.
+    That gap is an error of third order in the length of the stage. The contacts have the warm start.
     """
     return many.contacts.impulse[k, 0] > 0.0
 
@@ -154,7 +159,7 @@ def _not_known(k, slip, many):
 def is_slip_foretold(k, slip, many):
     """True if friction of contact k opposes the mean slip in the present stage: its slip is foretold to go on.
 
-    `slip` is its size before the stage [m/s]. Targets that oppose the mean slip have that size, others are much smaller.
+    `slip` is its size before the stage [m/s]. Targets against the mean slip have that size, others are much smaller.
     """
     t = row_vector(many.contacts.target, k, 0)
     return t[1] * t[1] + t[2] * t[2] > _MEAN_SHARE * _MEAN_SHARE * slip * slip

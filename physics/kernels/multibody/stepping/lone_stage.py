@@ -4,7 +4,8 @@ The velocity that contacts gain by turning after the middle of a stage belongs t
 twist is foretold from the impulses of the stage before. Friction opposes the mean of the slips before and after the
 stage, where the slip is foretold to go on.
 
-All of this is left out of kernels unless exactly one body moves, among fixed ones.
+All of this is left out of kernels unless exactly one body moves, among fixed ones. Several bodies under error control
+have the mean slip and the time in which gaps close, too (`foretold_twists`).
 """
 
 from __future__ import annotations
