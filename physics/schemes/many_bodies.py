@@ -94,6 +94,7 @@ class ManyBodies(Scheme):
             motion_columns=switches.motion_columns, laws=switches.laws, grain=_grain(scene, switches),
             lone=switches.lone, slip_ends=self._ends_stages_with_slips(switches),
             foretold=self._foretells_twists(switches),
+            even=self.is_error_controlled and LAW_STIFFNESS not in switches.laws,
             meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),

@@ -336,6 +336,7 @@ class BodiesWorkspace(NamedTuple):
     stage_start: StageStart | None  # None: stages do not end where slips end
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
     foretold: ForetoldTwists | None  # None without error control, or if a lone body moves, or contact is compliant
+    even: np.ndarray | None  # (0,) a switch: loads are shared evenly (`solver.even_loads`); None without error control
     resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
     grain: Grain | None  # None: the scene has no friction with two coefficients
     compliance: Compliance | None  # None: contact is rigid

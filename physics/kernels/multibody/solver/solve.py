@@ -39,6 +39,7 @@ from physics.kernels.multibody.solver.contact_operator import (
     max_contact_residual,
     velocity_error,
 )
+from physics.kernels.multibody.solver.even_loads import even_loads
 from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts, sweep_normals
 from physics.kernels.multibody.solver.interior_point import interior_point_contacts
 from physics.kernels.multibody.solver.islands import find_islands
@@ -94,6 +95,7 @@ _IMPULSE_ROUNDING = 2 * 2.0**-52
 _STRAIN_LIMIT = 1.0e9
 
 # Largest number of sweeps without friction, after all other methods have failed.
+_EVEN_STEPS = 40
 _FALLBACK_SWEEPS = 100
 
 # Residual at which the interior-point method gives way to Newton's method, relative to the largest velocity without
@@ -153,25 +155,30 @@ def _approach(part, start, goal, limit, many):
     return 0
 
 
-def _not_continued(part, friction, residual, goal, many):
+def _not_even(part, friction, residual, goal, many):
     return 0, residual
 
 
-@if_given("many.foretold", _not_continued)
-def _continue_solution(part, friction, residual, goal, many):
-    """Take Newton's method from the warm start: (Newton steps, residual [m/s]); arguments as of `newton_contacts`.
+@if_given("many.even", _not_even)
+def _solve_evenly(part, friction, residual, goal, many):
+    """Share the loads of faces evenly, and take Newton's method from there: (Newton steps, residual [m/s]).
 
-    Faces rest on more corners than they need, so that a problem has many solutions. Under error control the one nearest
-    to the stage before is wanted: a part and its halves would differ by any other choice.
+    Arguments are as of `newton_contacts`. If the goal is not reached, the impulses are as before.
     """
-    return newton_contacts(part, friction, residual, goal, _NEWTON_STEPS[0], NEWTON_RHO[0], many)
+    save_best(part, many)
+    start = even_loads(part, friction, residual, many)
+    steps, after = newton_contacts(part, friction, start, goal, _EVEN_STEPS, NEWTON_RHO[0], many)
+    if after <= goal:
+        return steps, after
+    restore_best(part, many)
+    return steps, residual
 
 
 def _all_sweeps(limit, many):
     return limit
 
 
-@if_given("many.foretold", _all_sweeps)
+@if_given("many.even", _all_sweeps)
 def _last_sweeps(limit, many):
     """Largest number of sweeps after all other methods, at most `limit`: a part without a solution is soon refused."""
     return min(limit, _FALLBACK_SWEEPS)
@@ -270,26 +277,27 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
     if steps < MIN_NEWTON_STEPS:
         more, residual = sweep_contacts(first, last, friction, residual, goal, limit - count, many)
         return count + more, residual, METHOD_SWEEPS
+    more, residual = _solve_evenly(part, friction, residual, goal, many)
+    if residual <= goal:
+        return 1 + count + more, residual, METHOD_NEWTON
     if count == 0:
         count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
         if residual <= goal:
-            return 1 + count, residual, METHOD_NEWTON
+            return 1 + count + more, residual, METHOD_NEWTON
+    count += more
     if not may_hold and is_every_contact_pushing(part, many):
         residual = try_all_sticking(part, friction, residual, deep, many)
         if residual <= goal:
             return 1 + count, residual, METHOD_NEWTON
-    more, residual = _continue_solution(part, friction, residual, goal, many)
-    count += more
-    if residual <= goal:
-        return 1 + count, residual, METHOD_NEWTON
     more, residual = alternate_second_order(
         part, friction, scale, residual, goal, max(1, steps - FIRST_SWEEPS - 1), many
     )
     count += 1 + more
     if residual > goal:
         more, residual = sweep_as_fallback(part, friction, residual, goal, _last_sweeps(limit, many), many)
-        count += more
-    return count, residual, METHOD_NEWTON
+        return count + more, residual, METHOD_NEWTON
+    more, residual = _solve_evenly(part, friction, residual, goal, many)
+    return count + more, residual, METHOD_NEWTON
 
 
 @inlined
