@@ -118,7 +118,7 @@ def _not_foretold(many):
     return False
 
 
-@if_given("many.foretold", _not_foretold)
+@if_given("many.even", _not_foretold)
 def is_foretold(many):
     """True if stages foretell the twists of bodies."""
     return True
@@ -128,7 +128,7 @@ def _never(k, many):
     return False
 
 
-@if_given("many.foretold", _never)
+@if_given("many.even", _never)
 def is_held(k, many):
     """True if contact k has pushed in the stage before: then it stays in contact, whatever its gap at the middle is.
 
@@ -141,7 +141,7 @@ def _open_gap(k, gap, many):
     return max(gap, 0.0)
 
 
-@if_given("many.foretold", _open_gap)
+@if_given("many.even", _open_gap)
 def gap_to_close(k, gap, many):
     """Gap of contact k, which touches, that closes in the time `longest_stage`; below 0 it is an overlap [m].
 
