@@ -93,6 +93,8 @@ class ManyBodies(Scheme):
             materials=(wall_materials(scene, switches, True), pair_materials(scene, switches)),
             motion_columns=switches.motion_columns, laws=switches.laws, grain=_grain(scene, switches),
             lone=switches.lone, slip_ends=self._ends_stages_with_slips(switches),
+            foretold=self._foretells_twists(switches),
+            even=self.is_error_controlled and LAW_STIFFNESS not in switches.laws,
             meet=_meetings(scene, switches),
             is_sequential=accuracy.collisions == "sequential", is_error_controlled=self.is_error_controlled,
             **settings(accuracy, impacts_of=bodies),
@@ -102,6 +104,10 @@ class ManyBodies(Scheme):
         """Answer whether stages end with slips: on driven bodies, and under error control of several moving bodies."""
         is_controlled = self.is_error_controlled and switches.friction and not switches.lone
         return switches.motion_columns > 0 or bool(is_controlled)
+
+    def _foretells_twists(self, switches: Switches) -> bool:
+        """Answer whether stages foretell twists: under error control of several moving bodies with rigid contact."""
+        return self.is_error_controlled and not switches.lone and LAW_STIFFNESS not in switches.laws
 
     def make_motion(self, scene: Scene, switches: Switches, accuracy: Accuracy) -> Any:
         """Make the memory in which error control keeps states of a world while it tries parts; None without it."""

@@ -442,6 +442,14 @@ STEPPING = [
         "physics/test_motion.py::test_a_chip_slides_off_a_turntable",
     ),
     _mutant(
+        "stepping-mean-slip-several",
+        "Friction of several bodies at precise opposes the slip at the end of a stage where the slip turns.",
+        "stepping/lone_stage.py",
+        "return _mean_slip_target_of_parts(k, t, u, many)",
+        "return t",
+        "physics/test_refine.py::test_a_block_that_slides_and_turns_takes_long_parts",
+    ),
+    _mutant(
         "stepping-restitution",
         "A bounce returns all of its speed, whatever its restitution.",
         "stepping/impact.py",

@@ -81,7 +81,7 @@ def test_dominoes_converge_with_the_tolerance():
     errors = np.array([np.abs(run(dominoes(), t, duration)[0].pos - truth.pos).max() for t in tolerances])
     slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
     print("dominoes: tolerance", tolerances, "error [m]", errors, "slope", slope)
-    assert 2 / 3 - 0.1 <= slope <= 1.1
+    assert 2 / 3 - 0.1 <= slope <= 1.2  # the errors of so few parts are off that line by a factor of up to two
     assert truth.linvel[0, 1, 0] > 0.1  # [m/s]: the second one has been struck
 
 
@@ -154,3 +154,23 @@ def test_only_what_asks_for_an_error_pays_for_it():
     for scene, accuracy in ((alone, PRECISE), (two, PRESETS["balanced"]), (two, PRESETS["fast"])):
         assert not physics.make_plan(scene, accuracy).scheme.is_error_controlled
     assert physics.World(two).motions == [None]
+
+
+def test_a_block_that_slides_and_turns_takes_long_parts():
+    """It takes half of the parts that friction against the slip at the end of a stage would need, at most.
+
+    The slip u of a corner turns at the rate k = ω² r/u. Friction of a stage of length h would then err by μ g k h²/2,
+    and a part would differ from its halves by half of that. So parts of h = √(4 e s/(μ g k)) would be the longest ones,
+    for the allowed error e and the speed s that errors are relative to. Against the mean slip the error is of third
+    order.
+    """
+    speed, spin, mu, steps, dt = 2.0, 1.0, 0.3, 5, 0.01
+    size, other = (1, 0.5, 1), physics.Block((1, 0.5, 1), 5.0, pos=(5, 0.25, 0))
+    block = physics.Block(size, 5.0, pos=(0, 0.25, 0), linvel=(speed, 0, 0), angvel=(0, spin, 0))
+    _, report = run(rough([block, other], mu), PRECISE.tolerance, steps * dt, dt)
+    radius = np.linalg.norm(size) / 2
+    reference = speed + radius * spin + np.sqrt(radius * G)
+    rate = spin**2 * np.sqrt(0.5) / (speed + np.sqrt(0.5) * spin)
+    longest = np.sqrt(4 * ERROR_PER_TOLERANCE * PRECISE.tolerance * reference / (mu * G * rate))
+    print("sliding and turning: contact problems", report.solves[0], "parts of first order", steps * dt / longest)
+    assert report.solves[0] / 3 <= steps * dt / longest / 2

@@ -37,6 +37,7 @@ from physics.kernels.multibody.data.arrays import (
     Compliance,
     ContactSet,
     DrivenBodies,
+    ForetoldTwists,
     Islands,
     LinearSystem,
     LoneBody,
@@ -178,6 +179,10 @@ def make_bodies_workspace(
         Whether exactly one body moves, and it can touch fixed bodies.
     slip_ends : bool
         Whether stages end where slips end (`stepping.slip_end`).
+    foretold : bool
+        Whether stages foretell the twists of several bodies (`stepping.foretold_twists`).
+    even : bool
+        Whether loads are shared evenly (`solver.even_loads`).
     settings : float
         Fields of `bodies_setting_fields`, by name, and `relative_slop`, the gap within which features touch, in
         bounding radii. By default bodies touch each other (`meet` is 1).
@@ -203,6 +208,8 @@ def make_bodies_workspace(
         driven=_make_driven(bodies, contacts, motion_columns),
         stage_start=_make_stage_start(bodies, contacts) if settings.pop("slip_ends", None) else None,
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
+        foretold=ForetoldTwists(np.zeros((bodies, 6)), np.zeros(1)) if settings.pop("foretold", None) else None,
+        even=np.zeros(0) if settings.pop("even", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
         grain=settings.pop("grain", None),
         compliance=_make_compliance(bodies, contacts) if LAW_STIFFNESS in laws else None,

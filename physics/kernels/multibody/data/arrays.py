@@ -276,6 +276,13 @@ class LoneBody(NamedTuple):
     suspect: np.ndarray  # (1,) int, place in the substep up to which a sudden change may be (`stepping.lone_part`)
 
 
+class ForetoldTwists(NamedTuple):
+    """Numbers of several moving bodies under error control, see `stepping.foretold_twists`."""
+
+    twist: np.ndarray  # (bodies, 6) twists foretold for the end of a stage [m/s, rad/s]
+    substep: np.ndarray  # (1,) length of the substep [s]
+
+
 class Resistance(NamedTuple):
     """Scratch of `solver.resistance_torques`: torques at the contacts of round bodies."""
 
@@ -332,6 +339,8 @@ class BodiesWorkspace(NamedTuple):
     driven: DrivenBodies | None  # None: the scene declares no motion
     stage_start: StageStart | None  # None: stages do not end where slips end
     lone: LoneBody | None  # None unless exactly one body moves, among fixed ones
+    foretold: ForetoldTwists | None  # None without error control, or if a lone body moves, or contact is compliant
+    even: np.ndarray | None  # (0,) a switch: loads are shared evenly (`solver.even_loads`); None without error control
     resistance: Resistance | None  # None: the scene declares neither rolling nor spin friction
     grain: Grain | None  # None: the scene has no friction with two coefficients
     compliance: Compliance | None  # None: contact is rigid

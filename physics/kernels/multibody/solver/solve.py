@@ -39,6 +39,7 @@ from physics.kernels.multibody.solver.contact_operator import (
     max_contact_residual,
     velocity_error,
 )
+from physics.kernels.multibody.solver.even_loads import even_loads
 from physics.kernels.multibody.solver.gauss_seidel import sweep_contacts, sweep_normals
 from physics.kernels.multibody.solver.interior_point import interior_point_contacts
 from physics.kernels.multibody.solver.islands import find_islands
@@ -94,6 +95,7 @@ _IMPULSE_ROUNDING = 2 * 2.0**-52
 _STRAIN_LIMIT = 1.0e9
 
 # Largest number of sweeps without friction, after all other methods have failed.
+_EVEN_STEPS = 40
 _FALLBACK_SWEEPS = 100
 
 # Residual at which the interior-point method gives way to Newton's method, relative to the largest velocity without
@@ -151,6 +153,35 @@ def _approach_inside_cones(part, start, goal, limit, many):
 def _approach(part, start, goal, limit, many):
     """Take no interior-point iterations: that method knows rigid contacts only. Otherwise it is done here."""
     return 0
+
+
+def _not_even(part, friction, residual, goal, many):
+    return 0, residual
+
+
+@if_given("many.even", _not_even)
+def _solve_evenly(part, friction, residual, goal, many):
+    """Share the loads of faces evenly, and take Newton's method from there: (Newton steps, residual [m/s]).
+
+    Arguments are as of `newton_contacts`. If the goal is not reached, the impulses are as before.
+    """
+    save_best(part, many)
+    start = even_loads(part, friction, residual, many)
+    steps, after = newton_contacts(part, friction, start, goal, _EVEN_STEPS, NEWTON_RHO[0], many)
+    if after <= goal:
+        return steps, after
+    restore_best(part, many)
+    return steps, residual
+
+
+def _all_sweeps(limit, many):
+    return limit
+
+
+@if_given("many.even", _all_sweeps)
+def _last_sweeps(limit, many):
+    """Largest number of sweeps after all other methods, at most `limit`: a part without a solution is soon refused."""
+    return min(limit, _FALLBACK_SWEEPS)
 
 
 @kernel
@@ -246,10 +277,14 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
     if steps < MIN_NEWTON_STEPS:
         more, residual = sweep_contacts(first, last, friction, residual, goal, limit - count, many)
         return count + more, residual, METHOD_SWEEPS
+    more, residual = _solve_evenly(part, friction, residual, goal, many)
+    if residual <= goal:
+        return 1 + count + more, residual, METHOD_NEWTON
     if count == 0:
         count, residual = sweep_contacts(first, last, friction, residual, goal, FIRST_SWEEPS, many)
         if residual <= goal:
-            return 1 + count, residual, METHOD_NEWTON
+            return 1 + count + more, residual, METHOD_NEWTON
+    count += more
     if not may_hold and is_every_contact_pushing(part, many):
         residual = try_all_sticking(part, friction, residual, deep, many)
         if residual <= goal:
@@ -259,9 +294,10 @@ def solve_island(part, friction, scale, residual, goal, deep, many):
     )
     count += 1 + more
     if residual > goal:
-        more, residual = sweep_as_fallback(part, friction, residual, goal, limit, many)
-        count += more
-    return count, residual, METHOD_NEWTON
+        more, residual = sweep_as_fallback(part, friction, residual, goal, _last_sweeps(limit, many), many)
+        return count + more, residual, METHOD_NEWTON
+    more, residual = _solve_evenly(part, friction, residual, goal, many)
+    return count + more, residual, METHOD_NEWTON
 
 
 @inlined

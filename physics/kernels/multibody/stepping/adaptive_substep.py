@@ -19,6 +19,7 @@ import math
 from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.multibody.stepping.compliant_stage import trials_of_springs
 from physics.kernels.multibody.stepping.extrapolation import extrapolate_springs
+from physics.kernels.multibody.stepping.foretold_twists import note_substep
 from physics.kernels.multibody.stepping.lone_part import step_first_part, step_lone_part
 from physics.kernels.multibody.stepping.part import UNITS_PER_SUBSTEP, following_part, max_body_error, step_part
 from physics.kernels.multibody.stepping.snapshots import (
@@ -143,6 +144,7 @@ def step_with_error_control(world, start, h, switches, kept, sleep, records, man
     part = int(records.memory[world, next_part] * UNITS_PER_SUBSTEP)
     if part == 0:
         part = UNITS_PER_SUBSTEP
+    note_substep(h, many)
     step_first_part(world, start, h, part * unit, switches, kept, records, many)
     while place < UNITS_PER_SUBSTEP:
         part, following, error, tried = _step_next_part(

@@ -4,7 +4,8 @@ The velocity that contacts gain by turning after the middle of a stage belongs t
 twist is foretold from the impulses of the stage before. Friction opposes the mean of the slips before and after the
 stage, where the slip is foretold to go on.
 
-All of this is left out of kernels unless exactly one body moves, among fixed ones.
+All of this is left out of kernels unless exactly one body moves, among fixed ones. Several bodies under error control
+have the mean slip and the time in which gaps close, too (`foretold_twists`).
 """
 
 from __future__ import annotations
@@ -21,9 +22,13 @@ from physics.kernels.multibody.data.arrays import (
     WARM_IMPULSE,
     WARM_STAGE_LENGTH,
 )
-from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
+from physics.kernels.multibody.data.contact_set import put_vector, relative_velocity, row_matrix
 from physics.kernels.multibody.data.lone_body import lone_body
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
+from physics.kernels.multibody.stepping.foretold_twists import (
+    foretell_twists_of_several,
+    longest_stage,
+)
 from physics.kernels.state.body import angular_velocity, read_state
 
 # Largest length of a stage, in lengths of the one before, and largest share of that one's impulse on contacts that are
@@ -81,7 +86,11 @@ def _foretell(n, world, h, switches, memory, many):
         put_vector(many.lone.later, 0, 3, angular_velocity(q, plus(L, turn), body, switches.flight.offset_frame))
 
 
-@if_given("many.lone")
+def _foretell_of_several(n, world, h, switches, memory, many):
+    foretell_twists_of_several(n, world, h, switches, memory, many)
+
+
+@if_given("many.lone", _foretell_of_several)
 def foretell_twist(n, world, h, switches, memory, many):
     """Write to `many.lone.later` the twist after a stage of h [s] whose n contacts push as in the stage before.
 
@@ -104,11 +113,37 @@ def exchange_twists(b, is_error_controlled, many):
         many.bodies.twist[b, c], many.lone.later[0, c] = many.lone.later[0, c], many.bodies.twist[b, c]
 
 
+@inlined
+def _oppose_mean_slip(k, t, u, change, many):
+    """Target t of contact k, along the face replaced by -u if its slip u goes on and turns, contact frame [m/s].
+
+    `change` is the change of the slip that is foretold for the stage, world frame [m/s].
+    """
+    b, square = many.contacts.bodies[k, 0], u[1] * u[1] + u[2] * u[2]
+    change = qt.matvec(row_matrix(many.contacts.frame, k), change)
+    along, most = u[1] * change[1] + u[2] * change[2], change[1] * change[1] + change[2] * change[2]
+    goes_on = many.contacts.impulse[k, 0] > 0.0 and along > -_SLIP_LOSS * square and most < square
+    least = _TURN_TOLERANCES * many.settings[0].tolerance * _load_speed(b, many)
+    is_turning = abs(u[1] * change[2] - u[2] * change[1]) > least * math.sqrt(square)
+    return (t[0], -u[1], -u[2]) if goes_on and is_turning else t
+
+
 def _end_slip_target(k, t, u, many):
     return t
 
 
-@if_given("many.lone", _end_slip_target)
+@if_given("many.foretold", _end_slip_target)
+def _mean_slip_target_of_parts(k, t, u, many):
+    """Target t of contact k between several moving bodies, as of `mean_slip_target`."""
+    change = minus(relative_velocity(k, many.foretold.twist, many), relative_velocity(k, many.bodies.twist, many))
+    return _oppose_mean_slip(k, t, u, change, many)
+
+
+def _mean_slip_target_of_several(k, t, u, many):
+    return _mean_slip_target_of_parts(k, t, u, many)
+
+
+@if_given("many.lone", _mean_slip_target_of_several)
 def mean_slip_target(k, t, u, many):
     """Target t of contact k, along the face replaced by -u if its slip u is foretold to go on, contact frame [m/s].
 
@@ -118,25 +153,20 @@ def mean_slip_target(k, t, u, many):
     """
     if many.lone.slow[0] == 1:
         return t
-    b, square = many.contacts.bodies[k, 0], u[1] * u[1] + u[2] * u[2]
+    b = many.contacts.bodies[k, 0]
     turn = minus(row_vector(many.lone.later, 0, 3), row_vector(many.bodies.twist, b, 3))
     change = plus(
         minus(row_vector(many.lone.later, 0, 0), row_vector(many.bodies.twist, b, 0)),
         qt.cross(turn, row_vector(many.contacts.arm, k, 0)),
     )
-    change = qt.matvec(row_matrix(many.contacts.frame, k), change)
-    along, most = u[1] * change[1] + u[2] * change[2], change[1] * change[1] + change[2] * change[2]
-    goes_on = many.contacts.impulse[k, 0] > 0.0 and along > -_SLIP_LOSS * square and most < square
-    least = _TURN_TOLERANCES * many.settings[0].tolerance * _load_speed(b, many)
-    is_turning = abs(u[1] * change[2] - u[2] * change[1]) > least * math.sqrt(square)
-    return (t[0], -u[1], -u[2]) if goes_on and is_turning else t
+    return _oppose_mean_slip(k, t, u, change, many)
 
 
-def _stage_length(h, many):
-    return h
+def _closing_time_of_several(h, many):
+    return longest_stage(h, many)
 
 
-@if_given("many.lone", _stage_length)
+@if_given("many.lone", _closing_time_of_several)
 def closing_time(h, many):
     """Time in which a small gap closes [s]: that of the stage, of length h, or the substep under error control.
 

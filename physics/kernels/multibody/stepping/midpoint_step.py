@@ -67,6 +67,7 @@ from physics.kernels.multibody.stepping.energy_budget import (
     save_pre_load_velocity,
     update_twist,
 )
+from physics.kernels.multibody.stepping.foretold_twists import gap_to_close, is_foretold, is_held
 from physics.kernels.multibody.stepping.impact import FORETOLD
 from physics.kernels.multibody.stepping.lone_stage import (
     closing_time,
@@ -207,15 +208,15 @@ def set_resting_targets(n, h, many):
         if many.settings[0].is_error_controlled == 1 or has_fixed(many) or has_cylinders(many):
             gap += 0.5 * half * (t[0] + driven_gain(k, many))
         u = qt.matvec(row_matrix(many.contacts.frame, k), slip_velocity(k, many))
-        if not may_roll(k, many):
+        if not (may_roll(k, many) or is_foretold(many)):
             t = clamp_target_to_energy(t, u)
         t = mean_slip_target(k, t, u, many)
         if many.contacts.target[k, 0] == FORETOLD:
             t = (t[0] - (max(gap, 0.0) + slop) / half, t[1], t[2])
-        elif gap > slop:
+        elif gap > slop and not is_held(k, many):
             t = (t[0] - (gap + parted_slack(k, many)) / half, t[1], t[2])
-        elif gap > 0.0:
-            t = (t[0] - GAP_CLOSING_SHARE * gap / long, t[1], t[2])
+        elif gap_to_close(k, gap, many) != 0.0:
+            t = (t[0] - GAP_CLOSING_SHARE * gap_to_close(k, gap, many) / long, t[1], t[2])
         negligible = max(
             many.settings[0].tolerance * relative_acceleration_bound(k, many) * h, NEGLIGIBLE_SLOP_SHARE * slop / long
         )

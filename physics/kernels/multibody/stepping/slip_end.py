@@ -27,6 +27,7 @@ from physics.kernels.multibody.data.contact_set import end_of_pair, relative_vel
 from physics.kernels.multibody.data.driven_bodies import bind_driven_twists, driven_velocity, is_driven
 from physics.kernels.multibody.data.kinematics import update_poses_and_twists
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
+from physics.kernels.multibody.stepping.foretold_twists import is_slip_foretold
 from physics.kernels.multibody.stepping.midpoint_step import midpoint_step
 
 # Largest number of trials to meet the end of a slip in a stage.
@@ -130,7 +131,7 @@ def _end_of_slip(first, last, h, many):
     """
     slip = row_vector(many.stage_start.slip, first, 0)
     before = math.sqrt(qt.dot(slip, slip))
-    if not before > 0.0:
+    if not before > 0.0 or is_slip_foretold(first, before, many):
         return h
     e = (slip[0] / before, slip[1] / before, slip[2] / before)
     share = _share_of_friction(first, last, e, many)

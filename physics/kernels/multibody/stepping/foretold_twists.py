@@ -1,0 +1,165 @@
+"""Targets of a resting stage of several bodies under error control: smooth, and of second order where a slip turns.
+
+Friction opposes the mean slip where a slip is foretold to go on and to turn (`lone_stage.mean_slip_target`). For that a
+stage is foretold to have the forces of the stage before. Where contacts of that one are no longer there, or it was much
+shorter, a body is foretold to keep its twist.
+
+A face rests on more corners than it needs, so that its contact problem has no solution unless its targets are those of
+a rigid motion. Three rules keep them so: gaps and overlaps close alike, contacts that push stay in contact, and targets
+are not clamped one by one. Gaps close in the time of the substep: in that of a short part, rounding would be a speed.
+
+All of this is left out of kernels without error control, of those of a lone body (`lone_stage`), and of those with
+compliant contact, whose parts are extrapolated.
+"""
+
+from __future__ import annotations
+
+from physics.compiler.decorators import if_given, inlined, kernel
+from physics.kernels.math import quaternion as qt
+from physics.kernels.math.vector import as_vector, minus, plus, row_vector, times
+from physics.kernels.multibody.data.arrays import (
+    WARM_BODY_A,
+    WARM_BODY_B,
+    WARM_CONTACT_COUNT,
+    WARM_CONTACT_SIZE,
+    WARM_HEADER_SIZE,
+    WARM_IMPULSE,
+    WARM_STAGE_LENGTH,
+)
+from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
+from physics.kernels.multibody.data.warm_start import load_warm_impulses
+from physics.kernels.multibody.stepping.allowed_error import allowed_depth
+from physics.kernels.state.body import angular_velocity, read_state
+from physics.kernels.state.fixed_body import is_fixed
+
+# Largest length of a stage, in lengths of the one before, and largest share of that one's impulse on contacts that are
+# no longer there, for which the stage before foretells this one.
+MAX_STRETCH = 8.0
+LOST_SHARE = 0.05
+
+# Least size of a target that opposes the mean slip, as a share of the slip before the stage.
+_MEAN_SHARE = 0.5
+
+
+@inlined
+def _impulse_of_last_stage(b, world, memory):
+    """Sum of the impulses on body b in the stage before, world frame [N s]."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
+        row = WARM_HEADER_SIZE + WARM_CONTACT_SIZE * k
+        p = row_vector(memory, world, row + WARM_IMPULSE)
+        if memory[world, row + WARM_BODY_A] == b:
+            total = plus(total, p)
+        elif memory[world, row + WARM_BODY_B] == b:
+            total = minus(total, p)
+    return total
+
+
+@inlined
+def _impulse_of_contacts(n, b, many):
+    """Sums of the impulses of the n contacts on body b, and of their moments, world frame [N s], [kg m²/s]."""
+    total, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for k in range(n):
+        p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
+        if many.contacts.bodies[k, 0] == b:
+            total, turn = plus(total, p), plus(turn, qt.cross(row_vector(many.contacts.arm, k, 0), p))
+        elif many.contacts.bodies[k, 1] == b:
+            total, turn = minus(total, p), minus(turn, qt.cross(row_vector(many.contacts.arm, k, 3), p))
+    return total, turn
+
+
+@kernel
+def _foretell_body(n, b, world, h, offset_frame, memory, many):
+    """Write the foretold twist of body b after a stage of h [s] to `many.foretold.twist`, if all its pushes go on."""
+    total, turn = _impulse_of_contacts(n, b, many)
+    before = times(h / memory[world, WARM_STAGE_LENGTH], _impulse_of_last_stage(b, world, memory))
+    lost, body = minus(total, before), many.bodies.body[b]
+    if qt.dot(lost, lost) <= LOST_SHARE * LOST_SHARE * qt.dot(before, before):
+        _, q, v, L = read_state(many.bodies.state, b)
+        v = plus(plus(v, times(h, as_vector(body.free_acceleration))), times(many.bodies.inv_mass[b], total))
+        L = plus(L, plus(turn, times(h, as_vector(body.torque))))
+        put_vector(many.foretold.twist, b, 0, v)
+        put_vector(many.foretold.twist, b, 3, angular_velocity(q, L, body, offset_frame))
+
+
+@if_given("many.foretold")
+def foretell_twists_of_several(n, world, h, switches, memory, many):
+    """Write to `many.foretold.twist` the twists after a stage of h [s] whose n contacts push as in the stage before.
+
+    A body keeps its twist if contacts that pushed it are no longer there, or the stage before was much shorter. `world`
+    is the index of the world, `memory` has its warm starts.
+    """
+    load_warm_impulses(n, world, h, switches.friction, memory, many)
+    is_long = not memory[world, WARM_STAGE_LENGTH] * MAX_STRETCH >= h
+    for b in range(many.bodies.state.shape[0]):
+        for c in range(6):
+            many.foretold.twist[b, c] = many.bodies.twist[b, c]
+        if many.bodies.touched[b] == 1 and not is_long and not is_fixed(b, many.bodies):
+            _foretell_body(n, b, world, h, switches.flight.offset_frame, memory, many)
+
+
+@if_given("many.foretold")
+def note_substep(h, many):
+    """Note the length h of a substep [s], before its parts are stepped."""
+    many.foretold.substep[0] = h
+
+
+def _same(h, many):
+    return h
+
+
+@if_given("many.foretold", _same)
+def longest_stage(h, many):
+    """Length of the substep, of which a stage of h [s] is a part [s]; h without error control of several bodies."""
+    return many.foretold.substep[0]
+
+
+def _not_foretold(many):
+    return False
+
+
+@if_given("many.even", _not_foretold)
+def is_foretold(many):
+    """True if stages foretell the twists of bodies."""
+    return True
+
+
+def _never(k, many):
+    return False
+
+
+@if_given("many.even", _never)
+def is_held(k, many):
+    """True if contact k has pushed in the stage before: then it stays in contact, whatever its gap at the middle is.
+
+    That gap is an error of third order in the length of the stage. The contacts have the warm start.
+    """
+    return many.contacts.impulse[k, 0] > 0.0
+
+
+def _open_gap(k, gap, many):
+    return max(gap, 0.0)
+
+
+@if_given("many.even", _open_gap)
+def gap_to_close(k, gap, many):
+    """Gap of contact k, which touches, that closes in the time `longest_stage`; below 0 it is an overlap [m].
+
+    Under error control overlaps open as gaps close, up to the allowed error. So the gaps of one face stay those of a
+    plane. Otherwise no velocity of the body would meet the targets of all its contacts.
+    """
+    return max(gap, -allowed_depth(many.contacts.bodies[k, 0], many))
+
+
+def _not_known(k, slip, many):
+    return False
+
+
+@if_given("many.foretold", _not_known)
+def is_slip_foretold(k, slip, many):
+    """True if friction of contact k opposes the mean slip in the present stage: its slip is foretold to go on.
+
+    `slip` is its size before the stage [m/s]. Targets against the mean slip have that size, others are much smaller.
+    """
+    t = row_vector(many.contacts.target, k, 0)
+    return t[1] * t[1] + t[2] * t[2] > _MEAN_SHARE * _MEAN_SHARE * slip * slip
