@@ -301,6 +301,14 @@ NARROWPHASE = [
 
 SOLVER = [
     _mutant(
+        "solver-even-loads",
+        "The corners of a face share its load as they did before.",
+        "solver/even_loads.py",
+        "if last - first > 3:",
+        "if last - first > 8:",
+        "physics/test_even_loads.py::test_it_moves_as_on_a_wall[in company-brick]",
+    ),
+    _mutant(
         "solver-face",
         "The face of a cylinder rolls on a wall.",
         "solver/resistance_torques.py",

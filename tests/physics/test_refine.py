@@ -73,7 +73,8 @@ def test_dominoes_converge_with_the_tolerance():
     """Against the run at 3e-11, until the first domino has struck the second one (two impacts, sliding, rolling over).
 
     A part of h errs by C h³, as much as is allowed, so that T/h of them err by tolerance**(2/3), to the tolerance where
-    single events decide: a slope of 2/3 to 1, and 0.1 for three points.
+    single events decide: a slope of 2/3 to 1, and 0.1 for three points. The truth has an error of its own, 0.3 of that
+    at 1e-10. So that point is lower by up to log10(1/0.7), which is half of 0.15 in the slope of three points.
     """
     duration = 0.45
     truth, _ = run(dominoes(), 3e-11, duration)
@@ -81,7 +82,7 @@ def test_dominoes_converge_with_the_tolerance():
     errors = np.array([np.abs(run(dominoes(), t, duration)[0].pos - truth.pos).max() for t in tolerances])
     slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
     print("dominoes: tolerance", tolerances, "error [m]", errors, "slope", slope)
-    assert 2 / 3 - 0.1 <= slope <= 1.2  # the errors of so few parts are off that line by a factor of up to two
+    assert 2 / 3 - 0.1 <= slope <= 1.1 + 0.08
     assert truth.linvel[0, 1, 0] > 0.1  # [m/s]: the second one has been struck
 
 

@@ -208,7 +208,7 @@ def make_bodies_workspace(
         driven=_make_driven(bodies, contacts, motion_columns),
         stage_start=_make_stage_start(bodies, contacts) if settings.pop("slip_ends", None) else None,
         lone=_make_lone(contacts) if settings.pop("lone", None) else None,
-        foretold=ForetoldTwists(np.zeros((bodies, 6)), np.zeros(1)) if settings.pop("foretold", None) else None,
+        foretold=_make_foretold(bodies) if settings.pop("foretold", None) else None,
         even=np.zeros(0) if settings.pop("even", None) else None,
         resistance=_make_resistance(bodies, contacts) if has_torques(laws) else None,
         grain=settings.pop("grain", None),
@@ -375,6 +375,10 @@ def _make_driven(bodies: int, contacts: int, columns: int) -> DrivenBodies | Non
 
 def _make_stage_start(bodies: int, contacts: int) -> StageStart:
     return StageStart(np.zeros((bodies, STATE_SIZE)), np.zeros((contacts, 3)), np.zeros((contacts, 3)))
+
+
+def _make_foretold(bodies: int) -> ForetoldTwists:
+    return ForetoldTwists(np.zeros((bodies, 6)), *(np.zeros((bodies, 3)) for _ in range(3)), np.zeros(1))
 
 
 def _make_lone(contacts: int) -> LoneBody:

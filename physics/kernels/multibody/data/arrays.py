@@ -280,6 +280,9 @@ class ForetoldTwists(NamedTuple):
     """Numbers of several moving bodies under error control, see `stepping.foretold_twists`."""
 
     twist: np.ndarray  # (bodies, 6) twists foretold for the end of a stage [m/s, rad/s]
+    push: np.ndarray  # (bodies, 3) impulse of the warm start on each body [N s]
+    turn: np.ndarray  # (bodies, 3) its moment [kg m²/s]
+    before: np.ndarray  # (bodies, 3) impulse on each body in the stage before [N s]
     substep: np.ndarray  # (1,) length of the substep [s]
 
 

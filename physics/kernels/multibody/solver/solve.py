@@ -12,6 +12,8 @@ If the warm start solves the problem, only its residual is computed. Else the co
    the twists from its result, in turns. Compliant contacts are left to Newton's method.
 5. Sweeps up to their limit, from the best impulses so far.
 
+Under error control Newton's method from evenly shared loads (`even_loads`) comes before 3, and once more after 4.
+
 An impact with a coarse tolerance begins with sweeps up to their limit, since few of its contacts change.
 
 In a resting stage, islands that are nearly at rest are solved below the tolerance (`near_rest_refinement`).
@@ -94,8 +96,10 @@ _IMPULSE_ROUNDING = 2 * 2.0**-52
 # hold a million times a body's weight.
 _STRAIN_LIMIT = 1.0e9
 
-# Largest number of sweeps without friction, after all other methods have failed.
+# Largest number of Newton steps from evenly shared loads.
 _EVEN_STEPS = 40
+
+# Largest number of sweeps without friction, after all other methods have failed.
 _FALLBACK_SWEEPS = 100
 
 # Residual at which the interior-point method gives way to Newton's method, relative to the largest velocity without

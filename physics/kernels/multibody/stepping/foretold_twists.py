@@ -42,44 +42,50 @@ _MEAN_SHARE = 0.5
 
 
 @inlined
-def _impulse_of_last_stage(b, world, memory):
-    """Sum of the impulses on body b in the stage before, world frame [N s]."""
-    total = (0.0, 0.0, 0.0)
-    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
-        row = WARM_HEADER_SIZE + WARM_CONTACT_SIZE * k
-        p = row_vector(memory, world, row + WARM_IMPULSE)
-        if memory[world, row + WARM_BODY_A] == b:
-            total = plus(total, p)
-        elif memory[world, row + WARM_BODY_B] == b:
-            total = minus(total, p)
-    return total
-
-
-@inlined
-def _impulse_of_contacts(n, b, many):
-    """Sums of the impulses of the n contacts on body b, and of their moments, world frame [N s], [kg m²/s]."""
-    total, turn = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(n):
-        p = qt.transposed_matvec(row_matrix(many.contacts.frame, k), row_vector(many.contacts.impulse, k, 0))
-        if many.contacts.bodies[k, 0] == b:
-            total, turn = plus(total, p), plus(turn, qt.cross(row_vector(many.contacts.arm, k, 0), p))
-        elif many.contacts.bodies[k, 1] == b:
-            total, turn = minus(total, p), minus(turn, qt.cross(row_vector(many.contacts.arm, k, 3), p))
-    return total, turn
+def _add(rows, b, p, sign):
+    """Add the vector p, times `sign`, to the first three columns of row b, if b is a body (-1 stands for a wall)."""
+    if b >= 0:
+        for c in range(3):
+            rows[b, c] += sign * p[c]
 
 
 @kernel
-def _foretell_body(n, b, world, h, offset_frame, memory, many):
-    """Write the foretold twist of body b after a stage of h [s] to `many.foretold.twist`, if all its pushes go on."""
-    total, turn = _impulse_of_contacts(n, b, many)
-    before = times(h / memory[world, WARM_STAGE_LENGTH], _impulse_of_last_stage(b, world, memory))
-    lost, body = minus(total, before), many.bodies.body[b]
+def _add_impulses_of_last_stage(world, memory, foretold):
+    """Add the impulses of the stage before to `foretold.before` of both bodies of each contact, world frame [N s]."""
+    for k in range(int(memory[world, WARM_CONTACT_COUNT])):
+        row = WARM_HEADER_SIZE + WARM_CONTACT_SIZE * k
+        p = row_vector(memory, world, row + WARM_IMPULSE)
+        _add(foretold.before, int(memory[world, row + WARM_BODY_A]), p, 1.0)
+        _add(foretold.before, int(memory[world, row + WARM_BODY_B]), p, -1.0)
+
+
+@kernel
+def _add_impulses_of_contacts(n, many):
+    """Add the impulses of the n contacts to `foretold.push`, their moments to `foretold.turn` [N s], [kg m²/s]."""
+    contacts, foretold = many.contacts, many.foretold
+    for k in range(n):
+        p = qt.transposed_matvec(row_matrix(contacts.frame, k), row_vector(contacts.impulse, k, 0))
+        for end in range(2):
+            b, sign = contacts.bodies[k, end], 1.0 - 2.0 * end
+            _add(foretold.push, b, p, sign)
+            _add(foretold.turn, b, qt.cross(row_vector(contacts.arm, k, 3 * end), p), sign)
+
+
+@kernel
+def _foretell_body(b, h, last, offset_frame, many):
+    """Write the foretold twist of body b after a stage of h [s] to `foretold.twist`, if all its pushes go on.
+
+    `last` is the length of the stage before [s].
+    """
+    foretold, body = many.foretold, many.bodies.body[b]
+    push, before = row_vector(foretold.push, b, 0), times(h / last, row_vector(foretold.before, b, 0))
+    lost = minus(push, before)
     if qt.dot(lost, lost) <= LOST_SHARE * LOST_SHARE * qt.dot(before, before):
         _, q, v, L = read_state(many.bodies.state, b)
-        v = plus(plus(v, times(h, as_vector(body.free_acceleration))), times(many.bodies.inv_mass[b], total))
-        L = plus(L, plus(turn, times(h, as_vector(body.torque))))
-        put_vector(many.foretold.twist, b, 0, v)
-        put_vector(many.foretold.twist, b, 3, angular_velocity(q, L, body, offset_frame))
+        v = plus(plus(v, times(h, as_vector(body.free_acceleration))), times(many.bodies.inv_mass[b], push))
+        L = plus(L, plus(row_vector(foretold.turn, b, 0), times(h, as_vector(body.torque))))
+        put_vector(foretold.twist, b, 0, v)
+        put_vector(foretold.twist, b, 3, angular_velocity(q, L, body, offset_frame))
 
 
 @if_given("many.foretold")
@@ -89,13 +95,20 @@ def foretell_twists_of_several(n, world, h, switches, memory, many):
     A body keeps its twist if contacts that pushed it are no longer there, or the stage before was much shorter. `world`
     is the index of the world, `memory` has its warm starts.
     """
+    foretold, last = many.foretold, memory[world, WARM_STAGE_LENGTH]
     load_warm_impulses(n, world, h, switches.friction, memory, many)
-    is_long = not memory[world, WARM_STAGE_LENGTH] * MAX_STRETCH >= h
     for b in range(many.bodies.state.shape[0]):
         for c in range(6):
-            many.foretold.twist[b, c] = many.bodies.twist[b, c]
-        if many.bodies.touched[b] == 1 and not is_long and not is_fixed(b, many.bodies):
-            _foretell_body(n, b, world, h, switches.flight.offset_frame, memory, many)
+            foretold.twist[b, c] = many.bodies.twist[b, c]
+        for c in range(3):
+            foretold.push[b, c] = foretold.turn[b, c] = foretold.before[b, c] = 0.0
+    if not last * MAX_STRETCH >= h:
+        return
+    _add_impulses_of_last_stage(world, memory, foretold)
+    _add_impulses_of_contacts(n, many)
+    for b in range(many.bodies.state.shape[0]):
+        if many.bodies.touched[b] == 1 and not is_fixed(b, many.bodies):
+            _foretell_body(b, h, last, switches.flight.offset_frame, many)
 
 
 @if_given("many.foretold")
