@@ -306,7 +306,7 @@ SOLVER = [
         "solver/even_loads.py",
         "if last - first > 3:",
         "if last - first > 8:",
-        "physics/test_even_loads.py::test_it_moves_as_on_a_wall[in company-brick]",
+        "physics/test_even_loads.py::test_it_moves_as_on_a_wall[alone-brick]",
     ),
     _mutant(
         "solver-face",

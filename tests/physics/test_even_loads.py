@@ -44,14 +44,15 @@ def slab() -> physics.Block:
 
 @pytest.mark.parametrize("case", sweep(CASES, ["brick"]))
 @pytest.mark.parametrize(
-    "company", sweep([False, True], [True]), ids=lambda company: "in company" if company else "alone"
+    "company", sweep([False, True], [False]), ids=lambda company: "in company" if company else "alone"
 )
 def test_it_moves_as_on_a_wall(case, company):
-    """Every part, of three contact problems, errs by the allowed error of the body's speed and size at the most.
+    """In company every part, of three contact problems, errs by the allowed error of the body's speed and size at most.
 
     An error of the velocity goes on for the time T. A problem that is solved for an impact or tried in vain counts as a
-    third of a part, too, so that the bound is a safe one: before loads were shared evenly, the place was 3e-4 to 1e-2 m
-    off. A ball that lies elsewhere makes several moving bodies.
+    third of a part, too, so that the bound is a safe one. Parts of a lone body are extrapolated. What is left of their
+    errors are residuals, a tolerance of the speed g h: g T²/2 tolerances of the place. Before loads were shared evenly,
+    the place was 3e-4 to 1e-2 m off. A ball that lies elsewhere is the company.
     """
     truth, _ = run([block(case)], [UP], case, "reference")
     ball = [physics.Sphere(0.2, 1.0, pos=(8, 0.2, 8))] if company else []
@@ -59,8 +60,10 @@ def test_it_moves_as_on_a_wall(case, company):
     size, velocity, spin, duration = CASES[case]
     radius = np.linalg.norm(size) / 2
     speed = np.linalg.norm(velocity) + radius * spin + np.sqrt(radius * G)
-    allowed = ERROR_PER_TOLERANCE * PRESETS["precise"].tolerance
+    tolerance = PRESETS["precise"].tolerance
+    allowed = solves / 3 * ERROR_PER_TOLERANCE * tolerance
+    bound = allowed * (radius + speed * duration) if company else tolerance * G * duration**2 / 2
     miss = np.abs((place - truth)[[0, 2]]).max()
-    print(case, company, "error [m]", miss, "contact problems", solves)
-    assert miss <= solves / 3 * allowed * (radius + speed * duration)
-    assert place[1] == pytest.approx(size[1] / 2, abs=solves / 3 * allowed * radius)
+    print(case, company, "error [m]", miss, "bound", bound, "contact problems", solves)
+    assert miss <= bound
+    assert place[1] == pytest.approx(size[1] / 2, abs=allowed * radius)

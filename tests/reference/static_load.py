@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 DIRECTIONS = 512
-"""Number of tangential forces at each contact. The polygon inside a disk leaves out 1 - cos(π/512) = 1.9e-5 of its radius."""
+"""Number of tangential forces at each contact. Inside a disk their polygon leaves out 1 - cos(π/512) = 1.9e-5."""
 
 
 def tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
