@@ -8,8 +8,8 @@ A face rests on more corners than it needs, so that its contact problem has no s
 a rigid motion. Three rules keep them so: gaps and overlaps close alike, contacts that push stay in contact, and targets
 are not clamped one by one. Gaps close in the time of the substep: in that of a short part, rounding would be a speed.
 
-All of this is left out of kernels without error control, of those of a lone body (`lone_stage`), and of those with
-compliant contact, whose parts are extrapolated.
+All of this is left out of kernels without error control, and of those with compliant contact, whose parts are
+extrapolated. A lone body has the three rules; `lone_stage` has its own mean slip and closing time.
 """
 
 from __future__ import annotations
@@ -150,18 +150,28 @@ def is_held(k, many):
     return many.contacts.impulse[k, 0] > 0.0
 
 
-def _open_gap(k, gap, many):
+def _closes_alike(k, gap, many):
+    return max(gap, -allowed_depth(many.contacts.bodies[k, 0], many))
+
+
+@if_given("many.driven", _closes_alike)
+def _gap_or_overlap(k, gap, many):
+    """Gap to close of contact k where bodies are driven: there overlaps stay, to open them would be work [m]."""
     return max(gap, 0.0)
 
 
-@if_given("many.even", _open_gap)
+def _only_gap(k, gap, many):
+    return max(gap, 0.0)
+
+
+@if_given("many.even", _only_gap)
 def gap_to_close(k, gap, many):
     """Gap of contact k, which touches, that closes in the time `longest_stage`; below 0 it is an overlap [m].
 
     Under error control overlaps open as gaps close, up to the allowed error. So the gaps of one face stay those of a
     plane. Otherwise no velocity of the body would meet the targets of all its contacts.
     """
-    return max(gap, -allowed_depth(many.contacts.bodies[k, 0], many))
+    return _gap_or_overlap(k, gap, many)
 
 
 def _not_known(k, slip, many):
