@@ -26,7 +26,7 @@ from physics.kernels.multibody.data.arrays import (
     WARM_IMPULSE,
     WARM_STAGE_LENGTH,
 )
-from physics.kernels.multibody.data.contact_set import put_vector, row_matrix
+from physics.kernels.multibody.data.contact_set import put_vector, relative_acceleration_bound, row_matrix
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
 from physics.kernels.multibody.stepping.allowed_error import allowed_depth
 from physics.kernels.state.body import angular_velocity, read_state
@@ -151,7 +151,9 @@ def is_held(k, many):
 
 
 def _closes_alike(k, gap, many):
-    return max(gap, -allowed_depth(many.contacts.bodies[k, 0], many))
+    if gap > -allowed_depth(many.contacts.bodies[k, 0], many) and relative_acceleration_bound(k, many) > 0.0:
+        return gap
+    return max(gap, 0.0)
 
 
 @if_given("many.driven", _closes_alike)
@@ -168,8 +170,9 @@ def _only_gap(k, gap, many):
 def gap_to_close(k, gap, many):
     """Gap of contact k, which touches, that closes in the time `longest_stage`; below 0 it is an overlap [m].
 
-    Under error control overlaps open as gaps close, up to the allowed error. So the gaps of one face stay those of a
-    plane. Otherwise no velocity of the body would meet the targets of all its contacts.
+    Under error control overlaps open as gaps close, so that the gaps of one face stay those of a plane. Otherwise no
+    velocity of the body would meet the targets of all its contacts. Overlaps above the allowed error are left to the
+    correction of positions, and so are those of bodies without loads, whose speeds would be rounding of the gaps.
     """
     return _gap_or_overlap(k, gap, many)
 
