@@ -15,7 +15,7 @@ RUN_HELP = "Folder of a run; code in its model.zip runs while it is read: take i
 RunArgument = Annotated[Path | None, typer.Argument(metavar="RUN_DIR", help=RUN_HELP)]
 BaselineOption = Annotated[str | None, typer.Option(help="Instead of a run: random or controller.")]
 EnvOption = Annotated[str, typer.Option(help="Of the baseline.")]
-SeedOption = Annotated[int, typer.Option(min=0, help="Of the set of episodes.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Chooses the episodes: the same number, the same ones.")]
 AccuracyOption = Annotated[str | None, typer.Option(help="Preset of the engine.", callback=checked_preset)]
 JsonOption = Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")]
 
