@@ -17,10 +17,11 @@ from gymnasium.error import DependencyNotInstalled
 from agents.baselines import Policy, baseline_policy
 from agents.evaluate import evaluation_seeds
 from agents.options import AccuracyOption, SeedOption
+from rigid_env.cli.common import at_least
 from rigid_env.envs.policy_files import act, load_policy
 from rigid_env.envs.pretrained import PRETRAINED, pretrained_path
 from rigid_env.extras import require
-from rigid_env.terminal import make_console, progress_bar, run_program
+from rigid_env.terminal import counted, make_console, progress_bar, run_program
 
 BASELINES = ("random", "controller")
 
@@ -94,7 +95,7 @@ def check_name(name: str, given: str | None) -> None:
 def main(
     env: Annotated[str, typer.Argument(metavar="ID", help="Gymnasium id.", show_default=False)],
     policy: Annotated[str, typer.Option(help="pretrained, random, controller, or a file of a policy.")] = PRETRAINED,
-    episodes: Annotated[int, typer.Option(min=1, help="How many, each with its own seed.")] = 100,
+    episodes: Annotated[int, typer.Option(callback=at_least(1), help="How many, each with its own seed.")] = 100,
     seed: SeedOption = 0,
     accuracy: AccuracyOption = "balanced",
     name: Annotated[str | None, typer.Option(help="namespace/name-v0.", show_default="environment and policy")] = None,
@@ -126,7 +127,8 @@ def main(
     except DependencyNotInstalled as error:
         console.print(f"Error: {error}", soft_wrap=True)
         raise typer.Exit(1) from None
-    console.print(f"data set    {made}: {episodes} episodes, {successes / episodes:.0%} successes", soft_wrap=True)
+    told = f"{counted(episodes, 'episode')}, {successes / episodes:.0%} successes"
+    console.print(f"data set    {made}: {told}", soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ as Ctrl-C would, and ends the worker. Without its parent it ends, too.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -60,6 +61,7 @@ def _work(connection: Connection) -> None:
     with suppress(KeyboardInterrupt, EOFError, ConnectionError):
         while True:
             _send(connection, run_job(connection.recv()))
+    gc.freeze()  # Python would look through all objects in the end, PyTorch's for a second
 
 
 def _interrupt(*signal_and_frame: object) -> None:
