@@ -53,7 +53,7 @@ class Interrupts:
         finally:
             signal.signal(signal.SIGINT, self._count)
 
-    def _count(self, *signal_and_frame: object) -> None:
+    def _count(self, *_: object) -> None:
         self.count += 1
         if self.count == 1:
             self._notice.send(None)

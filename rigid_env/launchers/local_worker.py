@@ -64,7 +64,7 @@ def _work(connection: Connection) -> None:
     gc.freeze()  # Python would look through all objects in the end, PyTorch's for a second
 
 
-def _interrupt(*signal_and_frame: object) -> None:
+def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
