@@ -18,13 +18,14 @@ import typer
 from rich.console import Console
 
 from agents.checkpoint import load_policy
-from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config
+from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, make_config, short_name
 from agents.curve import plot_transfer
 from agents.evaluate import evaluate
-from agents.options import JsonOption, write_json
+from agents.options import JsonOption, folder_option, write_json
 from agents.train import DEFAULTS, INTERRUPTED
 from agents.training import Interrupted, train
 from physics.accuracy import PRESETS
+from rigid_env.cli.common import at_least
 from rigid_env.cli.files import PLOTS, output_option
 from rigid_env.lab.measure import machine
 from rigid_env.terminal import Table, make_console, number_columns, run_program
@@ -134,13 +135,13 @@ def make_table(env: str, rows: list[Transfer]) -> Table:
 def main(
     env: Annotated[str, typer.Option(help="Gymnasium id, or module:id.")] = DEFAULTS["env"],
     algo: Annotated[str, typer.Option(help="ppo or sac.")] = "ppo",
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = DEFAULTS["seed"],
+    seed: Annotated[int, typer.Option(callback=at_least(0), help="Of all that is random.")] = DEFAULTS["seed"],
     accuracies: Annotated[str, typer.Option(metavar="NAMES", help="Presets to train at, with commas.")] = TRAINED_AT,
-    episodes: Annotated[int, typer.Option(min=1, help="Of each evaluation.")] = EPISODES,
+    episodes: Annotated[int, typer.Option(callback=at_least(1), help="Of each evaluation.")] = EPISODES,
     target: Annotated[float | None, typer.Option(help="Success rate to stop at, 0 to 1.")] = None,
     max_steps: Annotated[int | None, typer.Option(help="Steps to stop at.")] = None,
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
-    out: Annotated[Path, typer.Option(help="Where the runs are kept; done ones are not repeated.")] = Path("transfer"),
+    out: Annotated[Path, folder_option("Where the runs are kept; done ones are not repeated.")] = Path("transfer"),
     json_file: JsonOption = None,
     plot: Annotated[Path | None, output_option("--plot", *PLOTS, help="Draw the picture here.")] = None,
 ) -> None:
@@ -153,7 +154,7 @@ def main(
                 accuracy=name, evaluation_accuracy=name, target=target, max_steps=max_steps,
             )  # fmt: skip
             console.print(f"training at {name}", highlight=False)
-            run = RunFolder(out / f"{config.env.rpartition('/')[2]}-{algo}-s{seed}-{name}")
+            run = RunFolder(out / f"{short_name(config.env)}-{algo}-s{seed}-{name}")
             rows.append(transfer(config, run, episodes, console))
             console.print(make_table(config.env, rows[-1:]))
     except ValueError as error:

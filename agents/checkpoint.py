@@ -72,7 +72,7 @@ def list_checkpoints(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if path.name.isdigit())
 
 
-def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, Any]:
+def load_checkpoint(run: RunFolder, config: RunConfig, *, is_trusted: bool = False) -> tuple[BaseAlgorithm, Any]:
     """Load the newest checkpoint of a run: model, environments and random generators as they were.
 
     Code in its files runs while they are read; a line on standard error says so. On the same computer, with the same
@@ -82,6 +82,8 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     ----------
     run : RunFolder
     config : RunConfig
+    is_trusted : bool
+        Leave out the line about code.
 
     Returns
     -------
@@ -97,7 +99,8 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     found = list_checkpoints(run.checkpoints)
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a checkpoint")
-    tell_code_runs(found[-1] / MODEL)
+    if not is_trusted:
+        tell_code_runs(found[-1] / MODEL)
     with (found[-1] / STATE).open("rb") as file:
         state = pickle.load(file)
     model = CLASSES[config.algo].load(found[-1] / MODEL, env=state["env"], device="cpu", force_reset=False)
@@ -109,17 +112,17 @@ def load_checkpoint(run: RunFolder, config: RunConfig) -> tuple[BaseAlgorithm, A
     return model, state["history"]
 
 
-def load_policy(run: RunFolder) -> tuple[RunConfig, Policy]:
-    """Load the configuration and the trained policy of a run; the policy acts without exploration."""
-    config, model = load_trained(run)
+def load_policy(run: RunFolder, *, is_trusted: bool = False) -> tuple[RunConfig, Policy]:
+    """Load the configuration and the trained policy of a run, as `load_trained`; it acts without exploration."""
+    config, model = load_trained(run, is_trusted=is_trusted)
     return config, greedy(model)
 
 
-def load_trained(run: RunFolder) -> tuple[RunConfig, BaseAlgorithm]:
+def load_trained(run: RunFolder, *, is_trusted: bool = False) -> tuple[RunConfig, BaseAlgorithm]:
     """Load the configuration and the trained model of a run, for acting.
 
     The policy is read from `model.zip`, or from the newest checkpoint if training has not ended. Code in the file runs
-    while it is read; a line on standard error says so.
+    while it is read; a line on standard error says so, unless `is_trusted`.
 
     Raises
     ------
@@ -133,5 +136,6 @@ def load_trained(run: RunFolder) -> tuple[RunConfig, BaseAlgorithm]:
     if not found:
         raise ValueError(f"run is {str(run.path)!r}; allowed is one with a model.zip or a checkpoint")
     torch.set_num_threads(config.torch_threads)
-    tell_code_runs(found[-1])
+    if not is_trusted:
+        tell_code_runs(found[-1])
     return config, CLASSES[config.algo].load(found[-1], device="cpu", custom_objects=WITHOUT_REPLAY)

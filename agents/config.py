@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from collections.abc import Iterator
@@ -37,7 +38,7 @@ class RunConfig:
     Parameters
     ----------
     env : str
-        Gymnasium id.
+        Gymnasium id, with the module that registers it before a colon if this is another than ``rigid_env``.
     algo : {"ppo", "sac"}
     seed : int
         Seed of the policy's weights, the exploration and the environments.
@@ -116,7 +117,7 @@ def read_hyperparameters(env: str, algo: str, path: Path = HYPERPARAMETERS) -> d
     Parameters
     ----------
     env : str
-        Gymnasium id, without the module that may stand before a colon.
+        Gymnasium id. A module before a colon is left out in the file.
     algo : str
     path : Path
 
@@ -150,12 +151,19 @@ def environments_of(path: Path = HYPERPARAMETERS) -> list[str]:
     return list(yaml.safe_load(path.read_text(encoding="utf-8")))
 
 
+def short_name(env_id: str) -> str:
+    """Name of an environment in files: BlockReach-v0 of ``rigid_env/BlockReach-v0``."""
+    return re.split("[:/]", env_id)[-1]
+
+
 def _entries(env: str, path: Path) -> dict[str, dict[str, Any]]:
     """Entries of an environment in a file of hyperparameters, by algorithm."""
     table = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if env not in table:
-        raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}")
-    return table[env]
+    name = env.rpartition(":")[2]
+    if name not in table:
+        own = f"another file, --hyperparameters FILE, may have an entry {name!r}"
+        raise ValueError(f"env is {env!r}; allowed are those of {path.name}: {', '.join(table)}; {own}")
+    return table[name]
 
 
 def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **changes: Any) -> RunConfig:
@@ -166,9 +174,13 @@ def make_config(env: str, algo: str, seed: int, path: Path = HYPERPARAMETERS, **
     ValueError
         See `read_hyperparameters` and `RunConfig`.
     """
-    env = env.rpartition(":")[2]
-    config = RunConfig(env=env, algo=algo, seed=seed, **read_hyperparameters(env, algo, path))
-    return change(config, **changes)
+    entry = read_hyperparameters(env, algo, path)
+    env = env.removeprefix("rigid_env:")  # another module must be imported to make the environment
+    try:
+        config = RunConfig(env=env, algo=algo, seed=0, **entry)
+    except ValueError as error:
+        raise ValueError(f"{path.name}, {env}, {algo}: {error}") from error
+    return change(config, seed=seed, **changes)
 
 
 def change(config: RunConfig, **changes: Any) -> RunConfig:
@@ -272,7 +284,7 @@ class RunFolder:
 
 def make_folder(out: Path, config: RunConfig) -> RunFolder:
     """Make a new folder in `out`, named by environment, algorithm, seed and time; no two processes get the same one."""
-    name = f"{config.env.rpartition('/')[2]}-{config.algo}-s{config.seed}-{time.strftime('%Y%m%d-%H%M%S')}"
+    name = f"{short_name(config.env)}-{config.algo}-s{config.seed}-{time.strftime('%Y%m%d-%H%M%S')}"
     path, count = out / name, 1
     while True:
         try:

@@ -27,6 +27,7 @@ from rich.progress import Progress
 
 from agents.interval import wilson
 from physics import validation
+from rigid_env.cli.common import at_least
 from rigid_env.cli.files import output_option
 from rigid_env.cli.names import checked_preset
 from rigid_env.envs.making import make_task
@@ -253,13 +254,15 @@ def solve(env: gym.Env, planner: Planner, episodes: int, seed: int = 0) -> Solve
 
 def main(
     env: Annotated[str, typer.Option(help="Id of an environment of this package, or module:Class of a task.")] = ENV_ID,
-    episodes: Annotated[int, typer.Option(min=1, help="Episodes to plan.")] = 100,
+    episodes: Annotated[int, typer.Option(callback=at_least(1), help="Episodes to plan.")] = 100,
     method: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = METHODS[0],
-    samples: Annotated[int, typer.Option(min=2, help="Sequences in one iteration.")] = PlannerSettings.samples,
+    samples: Annotated[
+        int, typer.Option(callback=at_least(2), help="Sequences in one iteration.")
+    ] = PlannerSettings.samples,
     accuracy: Annotated[
         str, typer.Option(help="Preset of the model; the environment has its default.", callback=checked_preset)
     ] = "fast",
-    seed: Annotated[int, typer.Option(min=0, help="Of the first episode, and of the noise.")] = 1000,
+    seed: Annotated[int, typer.Option(callback=at_least(0), help="Of the first episode, and of the noise.")] = 1000,
     json: Annotated[Path | None, output_option("--json", ".json", help="Write the numbers here, too.")] = None,
 ) -> None:
     """Solve episodes by planning, without training."""

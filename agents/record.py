@@ -16,6 +16,7 @@ from agents.environments import make_single_env
 from agents.evaluate import choose_subject, evaluation_seeds
 from agents.options import AccuracyOption, BaselineOption, EnvOption, RunArgument, SeedOption
 from rigid_env.cli.camera_options import ArrowsOption, EyeOption, TargetOption, checked_camera
+from rigid_env.cli.common import at_least
 from rigid_env.envs.policy_files import act
 from rigid_env.terminal import make_console, run_program
 
@@ -112,7 +113,9 @@ def main(
     run: RunArgument = None,
     baseline: BaselineOption = None,
     env: EnvOption = "rigid_env/BlockReach-v0",
-    episodes: Annotated[int, typer.Option(min=1, help="How many, the first that agents.evaluate counts.")] = 4,
+    episodes: Annotated[
+        int, typer.Option(callback=at_least(1), help="How many, the first that agents.evaluate counts.")
+    ] = 4,
     seed: SeedOption = 0,
     accuracy: AccuracyOption = None,
     out: Annotated[Path | None, typer.Option(help="File to write, .mp4 or .gif.")] = None,

@@ -48,6 +48,7 @@ def run_or_resume(
     *,
     with_video: bool = False,
     with_tensorboard: bool = False,
+    is_trusted: bool = False,
     on_checkpoint: OnCheckpoint | None = None,
     console: Console | None = None,
 ) -> dict[str, Any]:
@@ -60,6 +61,8 @@ def run_or_resume(
         Folder of the run; made if it does not exist.
     with_video, with_tensorboard : bool
         Record some episodes at the end; write diagnostics.
+    is_trusted : bool
+        Leave out the line which says that code in the checkpoint runs.
     on_checkpoint : callable, optional
         See `Supervisor`.
     console : rich.console.Console, optional
@@ -87,8 +90,10 @@ def run_or_resume(
             return kept
         try:
             is_resumed = bool(list_checkpoints(run.checkpoints))
-            result = train(config, run, is_resumed=is_resumed, with_tensorboard=with_tensorboard,
-                           on_checkpoint=on_checkpoint, console=console)  # fmt: skip
+            result = train(
+                config, run, is_resumed=is_resumed, is_trusted=is_trusted, with_tensorboard=with_tensorboard,
+                on_checkpoint=on_checkpoint, console=console,
+            )  # fmt: skip
         except ValueError:
             run.discard()
             raise

@@ -20,14 +20,15 @@ from agents import asha
 from agents.algorithms import algorithm_arguments
 from agents.config import HYPERPARAMETERS, RunFolder
 from agents.environments import make_vector_env
-from agents.options import write_json
+from agents.options import folder_option, make_folders, write_json
 from agents.run import read_result
 from agents.trials import Trial, make_trials, parse_grid, parse_seeds
-from agents.worker import make_job
+from agents.worker import make_job, tell_models
+from rigid_env.cli.common import at_least
 from rigid_env.cli.names import listed_presets
 from rigid_env.launchers import LAUNCHERS, load
 from rigid_env.launchers.job import Ended, Launch
-from rigid_env.terminal import Table, make_console, number_columns, progress_bar, run_program
+from rigid_env.terminal import Table, counted, make_console, number_columns, progress_bar, run_program
 
 SCHEDULERS = ("asha",)  # of the launcher ray
 INTERRUPTED = 130
@@ -85,9 +86,9 @@ def sweep(
     ended = {name: Ended(name, result) for name, result in complete(trials, out).items()}
     left = [trial for trial in trials if trial.name not in ended]
     if ended:
-        console.print(f"{len(ended)} of {len(trials)} trials are complete already", highlight=False)
+        console.print(f"{len(ended)} of {counted(len(trials), 'trial')} complete already", highlight=False)
     if left:
-        console.print(f"{len(left)} trials to run, {jobs} at once", highlight=False)
+        console.print(f"{counted(len(left), 'trial')} to run, {jobs} at once", highlight=False)
     with progress_bar(console) as bar:
         task = bar.add_task("trials", total=len(trials), completed=len(ended))
         for end in launch([make_job(trial, out) for trial in left], out, jobs, address) if left else ():
@@ -121,15 +122,15 @@ def make_table(ends: Sequence[Ended]) -> Table:
 
 
 @contextmanager
-def told_ends(console: Console) -> Iterator[None]:
-    """Turn a missing library and Ctrl-C into a message and an exit status."""
+def told_ends(console: Console, goes_on: str = "from the last checkpoint of each trial") -> Iterator[None]:
+    """Turn a missing library and Ctrl-C into a message and an exit status; `goes_on` says where."""
     try:
         yield
     except DependencyNotInstalled as error:
         console.print(f"Error: {error}", soft_wrap=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
-        console.print("Interrupted: the same command goes on, from the last checkpoint of each trial.")
+        console.print(f"Interrupted: the same command goes on, {goes_on}.")
         raise typer.Exit(INTERRUPTED) from None
 
 
@@ -143,9 +144,9 @@ def main(
     accuracy: Annotated[str | None, typer.Option(help="Presets of the engine in training, with commas.")] = None,
     algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
-    out: Annotated[Path, typer.Option(help="Folder of the sweep; every worker sees it.")] = Path("sweep"),
+    out: Annotated[Path, folder_option("Folder of the sweep; every worker sees it.")] = Path("sweep"),
     launcher: Annotated[str, typer.Option(help=f"{', '.join(LAUNCHERS)}.")] = "local",
-    jobs: Annotated[int, typer.Option(min=1, help="Trials at once.")] = 2,
+    jobs: Annotated[int, typer.Option(callback=at_least(1), help="Trials at once.")] = 2,
     address: Annotated[str | None, typer.Option(help="Of a Ray cluster, or a Slurm partition (local: none).")] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="asha: stop trials that fall behind; with --launcher ray.", show_default="none")
@@ -164,13 +165,12 @@ def main(
         launch = load(launcher)
         check_scheduler(scheduler, launcher)
         check_arguments(trials)
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise typer.BadParameter(f"--out is {str(out)!r}, which cannot be made: {error.strerror}") from error
+        make_folders(out=out)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     if scheduler is not None:
         launch = partial(asha.launch, trials)
+    tell_models([trial for trial in trials if trial.name not in complete(trials, out)], out)
     with told_ends(console):
         ends = sweep(trials, out.resolve(), launch, jobs, address, console)
     if ends:

@@ -23,8 +23,9 @@ from rich.console import Console
 
 from agents.compile_ahead import compile_ahead
 from agents.config import HYPERPARAMETERS, RunConfig, RunFolder, change, default_algorithm, make_config, make_folder
-from agents.options import JsonOption, write_json
+from agents.options import JsonOption, folder_option, make_folders, write_json
 from agents.settings import apply_settings, parse_settings
+from rigid_env.cli.common import at_least
 from rigid_env.cli.names import checked_preset
 from rigid_env.terminal import make_console, run_program
 
@@ -78,7 +79,12 @@ def _run(
     from agents.run import check_same, read_result, run_or_resume
     from agents.training import Interrupted
 
-    run = make_folder(out, config) if given is None else RunFolder(given)
+    if given is None:
+        make_folders(out=out)
+        run = make_folder(out, config)
+    else:
+        make_folders(folder=given)
+        run = RunFolder(given)
     console.print(f"run         {run.path}", soft_wrap=True)
     try:
         if run.config.is_file():
@@ -99,7 +105,9 @@ def _run(
 def main(
     env: Annotated[str | None, typer.Option(help="Gymnasium id, or module:id.", show_default=DEFAULTS["env"])] = None,
     algo: Annotated[str | None, typer.Option(help="ppo or sac.", show_default="the first of the environment")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of all that is random.", show_default="0")] = None,
+    seed: Annotated[
+        int | None, typer.Option(callback=at_least(0), help="Of all that is random.", show_default="0")
+    ] = None,
     num_envs: Annotated[int | None, typer.Option(help="Worlds trained on at once.")] = None,
     accuracy: Annotated[
         str | None, typer.Option(help="Preset of the engine in training.", callback=checked_preset)
@@ -112,9 +120,9 @@ def main(
     ] = None,
     hyperparameters: Annotated[Path, typer.Option(help="YAML file.", exists=True)] = HYPERPARAMETERS,
     resume: Annotated[Path | None, typer.Option(metavar="RUN_DIR", help=RESUME_HELP)] = None,
-    out: Annotated[Path, typer.Option(help="Where the folders of runs are made.")] = Path("runs"),
+    out: Annotated[Path, folder_option("Where the folders of runs are made.")] = Path("runs"),
     folder: Annotated[
-        Path | None, typer.Option(help="Folder of the run, begun or gone on with; instead of --out.")
+        Path | None, folder_option("Folder of the run, begun or gone on with; instead of --out.", show_default=False)
     ] = None,
     video: Annotated[bool, typer.Option(help="Record some episodes at the end.")] = True,
     tensorboard: Annotated[bool, typer.Option(help="Write diagnostics for TensorBoard.")] = False,

@@ -26,6 +26,7 @@ def train(
     run: RunFolder,
     *,
     is_resumed: bool = False,
+    is_trusted: bool = False,
     with_tensorboard: bool = False,
     on_checkpoint: OnCheckpoint | None = None,
     console: Console | None = None,
@@ -40,6 +41,8 @@ def train(
     run : RunFolder
     is_resumed : bool
         Continue from the newest checkpoint in `run`.
+    is_trusted : bool
+        Leave out the line which says that code in the checkpoint runs.
     with_tensorboard : bool
         Write Stable-Baselines3's diagnostics for TensorBoard, too.
     on_checkpoint : callable, optional
@@ -62,7 +65,7 @@ def train(
     console = console or make_console()
     set_up_torch(config)
     if is_resumed:
-        model, history = load_checkpoint(run, config)
+        model, history = load_checkpoint(run, config, is_trusted=is_trusted)
     else:
         model, history = make_model(config, make_training_env(config)), History()
     run.path.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from agents.config import HYPERPARAMETERS, RunConfig, default_algorithm, make_config
+from agents.config import HYPERPARAMETERS, RunConfig, default_algorithm, make_config, short_name
 from agents.settings import apply_settings, parse_value
 
 # One thread per trial, since many trials share a machine.
@@ -83,7 +83,7 @@ def make_trials(
     trials = {}
     for env, values, seed in product(envs, product(*grid.values()), seeds):
         settings = dict(zip(grid, values))
-        name = algo or default_algorithm(env.rpartition(":")[2], hyperparameters)
+        name = algo or default_algorithm(env, hyperparameters)
         config = make_config(env, name, seed, hyperparameters)
         config = apply_settings(config, {**THREADS, **settings})
         trial = Trial(_name(config, settings), config, {**THREADS, **settings}, hyperparameters)
@@ -94,7 +94,7 @@ def make_trials(
 
 
 def _name(config: RunConfig, settings: Mapping[str, Any]) -> str:
-    parts = [f"{config.env.rpartition('/')[2]}-{config.algo}"]
+    parts = [f"{short_name(config.env)}-{config.algo}"]
     parts += [f"{name}={_label(value)}" for name, value in settings.items()]
     return "-".join([*parts, f"s{config.seed}"])
 

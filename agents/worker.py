@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from agents.config import RunConfig, RunInUse
+from agents.checkpoint import list_checkpoints
+from agents.config import RunConfig, RunFolder, RunInUse
 from agents.environments import warm_kernels
 from agents.run import run_or_resume
 from agents.supervisor import OnCheckpoint
@@ -27,10 +29,19 @@ def make_job(trial: Trial, out: Path, on_checkpoint: OnCheckpoint | None = None)
     return Job(trial.name, call, trial.command(out), partial(warm_kernels, trial.config))
 
 
+def tell_models(trials: Sequence[Trial], out: Path) -> None:
+    """Print a warning on standard error if models that are there already are about to be read, whose code runs."""
+    if any(list_checkpoints(RunFolder(out / trial.name).checkpoints) for trial in trials):
+        told = "models of Stable-Baselines3: code in them runs while they are read; take them from those you trust only"
+        print(f"rigid-env: {out} holds {told}", file=sys.stderr, flush=True)
+
+
 def run_trial(
     name: str, config: RunConfig, out: str, patience: float = PATIENCE, on_checkpoint: OnCheckpoint | None = None
 ) -> dict[str, Any]:
     """Run a trial, or go on with it, and return its result; `on_checkpoint` ends it by an error of its own.
+
+    Code in a checkpoint runs while it is read: the program that starts trials says so once, by `tell_models`.
 
     Raises
     ------
@@ -45,7 +56,8 @@ def run_trial(
     while True:
         try:
             quiet = Console(quiet=True)
-            return run_or_resume(config, Path(out) / name, on_checkpoint=on_checkpoint, console=quiet)
+            folder = Path(out) / name
+            return run_or_resume(config, folder, is_trusted=True, on_checkpoint=on_checkpoint, console=quiet)
         except RunInUse:
             if time.monotonic() >= limit:
                 raise

@@ -45,10 +45,10 @@ SceneArgument = Annotated[
 
 
 def at_least(least: int):
-    """Make a function that refuses numbers below `least`, for the `callback` of an option."""
+    """Make a function that refuses numbers below `least`, for the `callback` of an option; None stays None."""
 
-    def check(value: float) -> float:
-        if not value >= least:
+    def check(value: float | None) -> float | None:
+        if value is not None and not value >= least:
             raise typer.BadParameter(f"{value!r}; allowed are numbers from {least} on")
         return value
 

@@ -34,11 +34,14 @@ from typing import Any
 import numpy as np
 
 from physics import validation
-from rigid_env.envs.pretrained import is_id, pretrained_path
+from physics.keywords import nearest_first
+from rigid_env.envs.pretrained import is_id, pretrained_ids, pretrained_path
 from rigid_env.extras import require
 
 MODEL, ARRAYS = ".zip", ".npz"
 """Endings of policy files: a model of Stable-Baselines3, the only one read by `pickle`, and plain arrays."""
+
+NAMED = 3  # ids that the error about a missing file names, those spelt like it first
 
 WITHOUT_REPLAY = {"replay_buffer_class": None, "replay_buffer_kwargs": {}, "buffer_size": 1}
 """Arguments for loading a model that only acts, without replay buffer and environment."""
@@ -91,7 +94,8 @@ def load_policy(path: str | os.PathLike) -> Callable[[Observations], np.ndarray]
     if is_id(os.fspath(validation.path(path, "policy"))) and not Path(path).exists():
         return Network.load(pretrained_path(os.fspath(path)))
     path = Path(path)
-    ids = "the id of an environment that comes with one, as rigid_env/BlockReach-v0"
+    near = ", ".join(nearest_first(str(path), pretrained_ids())[:NAMED])
+    ids = f"the id of an environment that comes with one, as {near}"
     allowed = f"allowed are a model of Stable-Baselines3 ({MODEL}), plain arrays ({ARRAYS}), or {ids}"
     if not path.is_file():
         raise ValueError(f"policy is {str(path)!r}, which is no file; {allowed}")

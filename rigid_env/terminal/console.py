@@ -55,6 +55,11 @@ def ticking(console: Console, what: str, total: int) -> Iterator[Callable[[str],
         yield lambda text: progress.update(task, advance=1, description=text, refresh=True)
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number with its noun: "1 trial", "2 trials"."""
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
+
+
 def say(console: Console, label: str, text: str | Text) -> None:
     """Print a line with a label on the left; where a terminal breaks the line, the rest is aligned with the text."""
     line = Table.grid(padding=(0, 1, 0, 0))

@@ -68,6 +68,19 @@ def test_interrupted_command_says_how_to_go_on(small, tmp_path, monkeypatch):
     assert f"python -m agents.train --resume {folder}" in result.output
 
 
+def test_folders_are_checked_before_a_run(tmp_path):
+    (tmp_path / "file").touch()
+    for options, message in (
+        (["--out", tmp_path / "file"], "Invalid value for '--out'"),
+        (["--folder", tmp_path / "file"], "Invalid value for '--folder'"),
+        (["--out", "/proc/none/x"], "--out is '/proc/none/x', which cannot be made"),
+        (["--folder", "/proc/none/x"], "--folder is '/proc/none/x', which cannot be made"),
+    ):
+        result = run(train, *options)
+        assert result.exit_code == 2, result.output
+        assert message in result.text
+
+
 def test_evaluate_a_baseline(tmp_path):
     result = run(evaluate, "--baseline", "controller", "--episodes", 20, "--json", tmp_path / "e.json")
     assert result.exit_code == 0, result.output
@@ -122,7 +135,7 @@ def test_video_without_ffmpeg_is_a_gif(tmp_path, monkeypatch):
         (train, ("--algo", "dqn"), "algo is 'dqn'; allowed"),
         (train, ("--target", "1.5"), "target is 1.5; allowed"),
         (train, ("--num-envs", "0"), "num_envs is 0; allowed"),
-        (train, ("--seed", "-1"), "seed is -1; allowed"),
+        (train, ("--seed", "-1"), "'--seed': -1; allowed are numbers from 0 on"),
         (train, ("--accuracy", "sloppy"), "'--accuracy': 'sloppy'; allowed are fast"),
         (train, ("--resume", "nowhere"), "run is 'nowhere'; allowed is the folder of a run"),
         (train, ("--resume", "nowhere", "--seed", "1"), "seed cannot change with --resume; allowed are target"),

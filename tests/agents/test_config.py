@@ -18,7 +18,15 @@ from stable_baselines3.sac.policies import SACPolicy
 
 import physics
 from agents.algorithms import CLASSES, algorithm_arguments
-from agents.config import ALGORITHMS, HYPERPARAMETERS, RunFolder, change, make_config
+from agents.config import (
+    ALGORITHMS,
+    HYPERPARAMETERS,
+    RunFolder,
+    change,
+    default_algorithm,
+    make_config,
+    short_name,
+)
 from agents.features import FINE, GoalDifference
 from rigid_env.envs.registration import SUITE
 
@@ -68,6 +76,21 @@ def test_file_brings_back_what_was_written(tmp_path):
 
 def test_module_before_the_id_is_left_out():
     assert make_config("rigid_env:rigid_env/BlockReach-v0", "ppo", 0).env == "rigid_env/BlockReach-v0"
+
+
+def test_a_module_that_must_be_imported_is_kept(tmp_path):
+    path = tmp_path / "mine.yml"
+    path.write_text("mine/Shove-v0:\n  ppo: {num_envs: 8, max_steps: 100, target: 0.9}\n", encoding="utf-8")
+    config = make_config("shove:mine/Shove-v0", default_algorithm("shove:mine/Shove-v0", path), 0, path)
+    assert config.env == "shove:mine/Shove-v0"
+    assert short_name(config.env) == "Shove-v0"
+
+
+def test_wrong_values_of_a_file_name_file_and_environment(tmp_path):
+    path = tmp_path / "mine.yml"
+    path.write_text("mine/Shove-v0:\n  ppo: {num_envs: 8, max_steps: 100, target: 1.1}\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"^mine.yml, mine/Shove-v0, ppo: target is 1.1; allowed are success rates"):
+        make_config("mine/Shove-v0", "ppo", 0, path)
 
 
 @pytest.mark.parametrize(

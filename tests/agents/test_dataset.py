@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import types
 
 import gymnasium as gym
 import numpy as np
@@ -53,6 +54,39 @@ def test_without_minari_the_extra_is_named(monkeypatch):
     assert "rigid-env[minari]" in run(CURL, "--policy", "random", code=1)
 
 
+@pytest.fixture
+def minari_without_episodes(tmp_path, monkeypatch):
+    """A stand-in of Minari that has data sets in a folder, and fails when episodes are to be collected."""
+
+    def collects(*given, **named):
+        raise AssertionError("episodes are run")
+
+    storage = types.SimpleNamespace(get_dataset_path=lambda name: tmp_path / name)
+    monkeypatch.setitem(sys.modules, "minari", types.SimpleNamespace(DataCollector=collects, storage=storage))
+    monkeypatch.setitem(sys.modules, "minari.storage", storage)
+    monkeypatch.setattr(program, "require", lambda *names, purpose: None)
+    return tmp_path
+
+
+def refused(*options) -> str:
+    return run(CURL, "--policy", "random", *options, code=2).replace("│ ", "")
+
+
+@pytest.mark.parametrize("name", ["foo", "foo-v", "a b/c-v0", "x/y-v0", "rigid.env/c-v0", ""])
+def test_a_name_of_another_form_is_refused_before_any_episode(name, minari_without_episodes):
+    output = refused("--name", name)
+    assert f"--name is {name!r}; allowed is --name namespace/name-v0" in output
+
+
+def test_a_data_set_that_exists_is_left_alone_before_any_episode(minari_without_episodes):
+    (minari_without_episodes / "mine" / "curl-v9").mkdir(parents=True)
+    output = refused("--name", "mine/curl-v9")
+    assert "--name is 'mine/curl-v9', which exists already; allowed is a new version, as --name mine/curl-v10" in output
+    assert "minari delete mine/curl-v9" in output
+    (minari_without_episodes / default_name(CURL, "random")).mkdir(parents=True)
+    assert "without --name the data set is 'rigid_env/BlockCurl/random-v0', which exists" in refused()
+
+
 @pytest.mark.exhaustive
 def test_minari_reads_what_was_written(tmp_path, monkeypatch):
     minari = pytest.importorskip("minari")
@@ -63,4 +97,10 @@ def test_minari_reads_what_was_written(tmp_path, monkeypatch):
     kept = minari.load_dataset("rigid_env/BlockCurl/controller-v0")
     assert kept.total_episodes == 4
     assert all(episode.terminations[-1] for episode in kept.iterate_episodes())
+    for episode in kept.iterate_episodes():
+        is_success = episode.infos["is_success"]
+        assert is_success.shape == (len(episode.actions) + 1,)
+        assert is_success[-1]
+        assert not is_success[0]
     assert kept.recover_environment().unwrapped.spec.id == CURL
+    assert "which exists already" in run(CURL, "--policy", "controller", code=2).replace("│ ", "")

@@ -84,9 +84,51 @@ def test_it_trains_judges_and_writes_once(hyperparameters, here, tmp_path):
     assert {"processor", "versions"} <= set(kept["machine"])
     floors = json.loads((tmp_path / "r" / "BlockCurl-v0-floors.json").read_text())["floors"]
     assert floors["controller"]["success_rate"] == 1.0
+    assert "code in" not in output  # of models that it has made
     here.clear()
-    assert run(*options).endswith(output.rpartition("suite")[2])
+    assert run(*options).endswith(output.rpartition(" suite ")[2])
+    assert "BlockCurl-v0 ppo 1 " in run(*told(hyperparameters, tmp_path, "1"))  # of one seed
     assert here == []  # all is there
+
+
+def test_results_lie_beside_the_runs_and_replaced_ones_are_told(hyperparameters, here, tmp_path):
+    options = ["--hyperparameters", hyperparameters, "--seeds", "0", "--out", tmp_path / "o"]
+    assert "replaced" not in run(*options)
+    written = tmp_path / "o" / "results" / "BlockCurl-v0-ppo-s0.json"
+    kept = json.loads(written.read_text())
+    other = {**kept, "evaluation": {**kept["evaluation"], "success_rate": 0.75, "successes": 3}}
+    other["machine"] = {"git": {"commit": "abcdef0123456789"}, "date": "2026-01-02T03:04:05"}
+    written.write_text(json.dumps(other))
+    output = run(*options)
+    rate = f"{kept['evaluation']['success_rate']:.1%}"
+    assert f"is replaced: it had success 75.0%, made at abcdef0123 on 2026-01-02; it is {rate} now" in output
+    assert json.loads(written.read_text())["evaluation"] == kept["evaluation"]
+
+
+def test_code_in_models_of_an_earlier_command_is_told_once(hyperparameters, here, tmp_path):
+    options = told(hyperparameters, tmp_path, "0")
+    run(*options)
+    folder = tmp_path / "o" / "BlockCurl-v0-ppo-s0"
+    for path in (folder / "result.json", folder / "judged.json", tmp_path / "r" / f"{folder.name}.json"):
+        path.unlink()
+    here.clear()
+    output = run(*options)
+    assert len(here) == 3  # the trial goes on from its checkpoint, and is judged twice
+    assert output.count("code in") == 1
+    assert "o holds models of Stable-Baselines3: code in them runs" in output
+
+
+def test_ctrl_c_says_what_goes_on(hyperparameters, here, tmp_path, monkeypatch):
+    def interrupted(*given):
+        raise KeyboardInterrupt
+
+    options = told(hyperparameters, tmp_path, "0")
+    monkeypatch.setattr(program, "judge_trial", interrupted)
+    output = run(*options, code=130)
+    assert "1 trial to run" in output
+    assert "goes on, with the policies that are not judged yet" in output
+    monkeypatch.setattr(program, "sweep", interrupted)
+    assert "goes on, from the last checkpoint of each trial" in run(*options, code=130)
 
 
 def test_a_preset_that_is_judged_is_not_judged_again(hyperparameters, here, tmp_path, monkeypatch):
@@ -114,7 +156,7 @@ def test_a_preset_that_is_judged_is_not_judged_again(hyperparameters, here, tmp_
 
 def test_trials_at_presets_stand_beside_the_others(hyperparameters, here, tmp_path):
     options = told(hyperparameters, tmp_path, "0")
-    run(*options, "--accuracy", "fast")
+    assert "BlockCurl-v0 ppo at fast 1 " in run(*options, "--accuracy", "fast")
     found, _ = program.read_results(tmp_path / "r", CURL)
     assert [(each["accuracy"], each["is_default"]) for each in found] == [("fast", False)]
 
@@ -137,3 +179,18 @@ def test_mistakes_are_named(hyperparameters, tmp_path, monkeypatch):
     assert "launcher is 'print', which runs nothing" in run(*options, "--launcher", "print", code=2).replace("│ ", "")
     assert "env is 'no/Such-v0'" in run("no/Such-v0", *options, code=2)
     assert "seeds is 'x'" in run(*options, "--seeds", "x", code=2)
+    output = run("mine:no/Such-v0", *options, code=2).replace("│ ", "")
+    assert "env is 'mine:no/Such-v0'; allowed are those of tiny.yml" in output
+    assert "another file, --hyperparameters FILE, may have an entry 'no/Such-v0'" in output
+
+
+@pytest.mark.parametrize("option", ["--out", "--results"])
+def test_folders_are_checked_before_any_trial(option, hyperparameters, here, tmp_path):
+    (tmp_path / "file").touch()
+    options = told(hyperparameters, tmp_path, "0")
+    output = run(*options, option, tmp_path / "file", code=2).replace("│ ", "")
+    assert f"Invalid value for '{option}'" in output
+    assert "allowed are folders" in output
+    output = run(*options, option, "/proc/none/x", code=2).replace("│ ", "")
+    assert f"{option} is '/proc/none/x', which cannot be made" in output
+    assert here == []

@@ -5,6 +5,7 @@ import io
 import os
 import pty
 import re
+import signal
 import subprocess
 import sys
 
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from benchmarks.processes import killed_after
-from rigid_env.terminal import Column, Table, make_console, number_columns, say
+from rigid_env.terminal import Column, Table, counted, make_console, number_columns, say
 
 WIDTHS = (40, 60, 80, 120)
 
@@ -47,6 +48,29 @@ def test_no_line_is_wider_than_the_terminal_and_no_word_is_lost(width):
             assert word in words
     assert "a title [s]" in text
     assert "a caption [m]" in text
+
+
+def test_one_thing_is_no_plural():
+    assert [counted(count, "trial") for count in (0, 1, 1200)] == ["0 trials", "1 trial", "1,200 trials"]
+
+
+LATE = """
+import atexit, os, signal
+from rigid_env.terminal import run_program
+
+def main():
+    print("done", flush=True)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a test run in the background has it ignored
+atexit.register(os.kill, os.getpid(), signal.SIGINT)
+run_program(main)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_ctrl_c_at_the_end_of_a_program_gives_no_traceback():
+    done = subprocess.run([sys.executable, "-c", LATE], capture_output=True, text=True, timeout=300, check=False)
+    assert (done.stdout, done.stderr, done.returncode) == ("done\n", "", -signal.SIGINT)
 
 
 def test_a_table_has_three_layouts():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import threading
 from functools import partial
 
 import pytest
@@ -50,12 +51,14 @@ def test_processes_run_jobs_and_start_those_of_a_dead_one_again(tmp_path):
     jobs = [Job(f"{k}", partial(divide, float(k), 2.0), "") for k in range(4)]
     jobs.append(Job("dies", partial(die_once, str(tmp_path / "mark")), ""))
     jobs.append(Job("bad", partial(refuse, 1), ""))
+    jobs.append(Job("unsent", threading.Lock, ""))
     told = list(Place("local", tmp_path, 2).run(jobs))
     assert sorted(end.name for end in told) == sorted(job.name for job in jobs)  # each ends once
     ends = {end.name: end for end in told}
     assert [ends[f"{k}"].result for k in range(4)] == [0.0, 0.5, 1.0, 1.5]
     assert ends["dies"].result == "lived"
     assert ends["bad"].error == "value is 1; allowed is none"
+    assert ends["unsent"].error.startswith("result cannot be sent: TypeError: cannot pickle")
 
 
 def test_a_job_that_always_kills_its_process_is_given_up(tmp_path):

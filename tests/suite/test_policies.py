@@ -71,6 +71,11 @@ def test_an_environment_without_a_policy_is_refused_with_those_that_have_one():
     assert "no trained policy" in " ".join(done.output.split())
 
 
+def test_an_id_without_its_namespace_is_answered_with_the_id():
+    with pytest.raises(ValueError, match=r"'BlockReach-v0', which is no file; .* as rigid_env/BlockReach-v0, "):
+        rigid_env.load_policy("BlockReach-v0")
+
+
 def test_what_is_an_id():
     assert is_id(REACH)
     assert is_id(f"rigid_env:{REACH}")
