@@ -23,6 +23,10 @@ class BlockReach(BlockTask):
         *entries.HOLD,
     )
     measures = ("distance", "speed", "spin")
+    meanings = {
+        "goal": "x and z of the goal [m]",
+        "distance": "horizontal distance of the block's centre from the goal [m]",
+    }
     goal_draw = "goal"
     error_name = "distance"
     compiled = staticmethod(kernels.observe_reach)

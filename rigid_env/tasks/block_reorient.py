@@ -19,6 +19,10 @@ class BlockReorient(BlockTask):
         *entries.HOLD,
     )
     measures = ("angle", "speed", "spin")
+    meanings = {
+        "target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z",
+        "angle": "angle between the target face's normal and straight down [rad]",
+    }
     goal_draw = "target_face"
     error_name = "angle"
     compiled = staticmethod(kernels.observe_reorient)
