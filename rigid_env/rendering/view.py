@@ -58,7 +58,9 @@ def seen_of(task: Task) -> tuple[np.ndarray, np.ndarray]:
     Observed pictures leave `sight` out; see `room_of`.
     """
     lower, upper = bounds_of(task.world.scene)
-    return (lower, upper) if task.sight is None else (np.minimum(lower, task.sight[0]), np.maximum(upper, task.sight[1]))
+    if task.sight is None:
+        return lower, upper
+    return np.minimum(lower, task.sight[0]), np.maximum(upper, task.sight[1])
 
 
 def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -138,9 +140,7 @@ class View:
         """Draw a frame in the room of a task, with the user's camera or that of the task; as `draw`."""
         if self._renderer is None:
             camera = self.camera or as_camera(task.camera, f"camera of {type(task).__name__}")
-            self._renderer = Renderer(
-                self.width, self.height, self.mode, self.fps, self.title, camera, seen_of(task)
-            )
+            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, camera, seen_of(task))
         return self._renderer.draw(frame)
 
     def close(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from rigid_env.tasks import block_entries as entries
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
@@ -23,7 +25,7 @@ class BlockReach(BlockTask):
         *entries.HOLD,
     )
     measures = ("distance", "speed", "spin")
-    meanings = {
+    meanings: ClassVar = {
         "goal": "x and z of the goal [m]",
         "distance": "horizontal distance of the block's centre from the goal [m]",
     }

@@ -20,7 +20,7 @@ from rigid_env.tasks.arguments import constructor_arguments
 from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.goal import GoalTask
-from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meaning, draw_meaning, meanings_of
+from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, OWN_CAMERA, argument_meaning, draw_meaning, meanings_of
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.written import Part, sentences, written_parts
 
@@ -36,8 +36,8 @@ ROTATION = "R is the rotation matrix from body to world, by rows."
 """Explanation of entries such as R[0, 0]."""
 
 NO_DRAWS = (
-    "There is no argument `draws`: `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) or a "
-    "distribution instead, and `reset(options=...)` fixes any draw of an episode."
+    "There is no argument `draws`: `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) or "
+    "a distribution instead, and `reset(options=...)` fixes any draw of an episode."
 )
 """Note about the block's tasks."""
 
@@ -255,7 +255,8 @@ def _end(task: Task) -> Section:
 def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, Any]) -> Section:
     kind = type(task)
     known = {name: each.default for name, each in constructor_arguments(kind).items()}
-    meanings = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    meanings: dict[str, str] = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    meanings |= {} if task.camera is None else {"camera": OWN_CAMERA}
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
     notes = (NO_DRAWS,) if isinstance(task, BlockTask) else ()
