@@ -23,7 +23,7 @@ from rigid_env.envs.pretrained import pretrained_ids
 from rigid_env.lab.measure.machine import write_json
 from rigid_env.terminal import Table, make_console, number_columns, run_program
 
-FILE = machine.RESULTS / "shipped-policies.json"
+FILE = machine.RESULTS / "shipped_policies.json"
 FRESH = 7  # seed of a set of episodes of its own, beyond the seeds of the suite
 EPISODES = 1000
 OF_ENVIRONMENTS = ("accuracy", "reward")  # arguments of an evaluation

@@ -53,14 +53,14 @@ def room_of(task: Task) -> Room:
 
 
 def seen_of(task: Task) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner (3,) [m] of the box that pictures of a task have in view: bodies, and the task's `sight`.
+    """Lower and upper corner (3,) [m] of the box that pictures of a task show: its bodies, and its `shown_box`.
 
-    Observed pictures leave `sight` out; see `room_of`.
+    Observed pictures leave `shown_box` out; see `room_of`.
     """
     lower, upper = bounds_of(task.world.scene)
-    if task.sight is None:
+    if task.shown_box is None:
         return lower, upper
-    return np.minimum(lower, task.sight[0]), np.maximum(upper, task.sight[1])
+    return np.minimum(lower, task.shown_box[0]), np.maximum(upper, task.shown_box[1])
 
 
 def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

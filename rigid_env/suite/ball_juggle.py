@@ -134,7 +134,7 @@ class BallJuggle(Task):
         "aside": Uniform((-ASIDE, -ASIDE), (ASIDE, ASIDE)),
         "drift": Uniform((-DRIFT, -DRIFT), (DRIFT, DRIFT)),
     }
-    meanings = {
+    explanations = {
         "wanted": "wanted apex, a height over the block's place at rest [m]",
         "restitution": "restitution of ball and block",
         "release": "height of the ball's centre at the start [m]",

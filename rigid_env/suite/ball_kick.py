@@ -138,7 +138,7 @@ class BallKick(Task):
         "side": Uniform(-SIDE, SIDE),
         "wind": Uniform((-5.0, -5.0), (5.0, 5.0)),
     }
-    meanings = {
+    explanations = {
         "ring": "centre of the ring [m]",
         "side": "place of the post along z, beside the line from ball to ring [m]",
         "wind": "velocity of the air along x and z [m/s]",
@@ -147,7 +147,7 @@ class BallKick(Task):
         "reward_success": "bonus for success",
     }
     camera = {"eye": (-7.0, 6.9, 5.0), "target": (8.3, -0.3, -1.1), "fov_y": 35.0}  # a free kick, from behind
-    sight = ((-2.0, 0.0, -5.0), (24.0, 4.0, 5.0))
+    shown_box = ((-2.0, 0.0, -5.0), (24.0, 4.0, 5.0))
     memory = {"place": 3, "velocity": 3, "miss": 1, "wind": 2}
     max_episode_steps = FLIGHT
 

@@ -98,7 +98,7 @@ class BlockBalance(Task):
         observe.linvel(0, SPEED, 5),
         observe.angvel(0, SPIN, 5),
     ]
-    meanings = {
+    explanations = {
         "start_lean": "lean about the z axis at the start [rad]",
         "yaw": "turn about the vertical after the lean [rad]",
         "lean": "angle between the vertical and the line from contact to centre [rad]",

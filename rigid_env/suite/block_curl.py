@@ -142,7 +142,7 @@ class BlockCurl(Task):
         Entry("share of the push that is left", "1", 0, 1, lambda w: np.maximum(1.0 - w.steps / PUSHED, 0.0)),
     ]
     draws = {"goal": Ring(), "friction": FRICTION}
-    meanings = {
+    explanations = {
         "goal": "x and z of the mark [m]",
         "distance": "distance from the mark [m]",
         "miss": "distance from the mark at which the stone would stop without a further push [m]",

@@ -119,7 +119,7 @@ class BlockLand(Task):
         "angvel": Uniform(3 * (-SPIN,), 3 * (SPIN,)),
         "target_face": Choice(range(6)),
     }
-    meanings = {
+    explanations = {
         "height": "height of the centre at the start [m]",
         "attitude": "quaternion w, x, y, z at the start",
         "linvel": "velocity at the start [m/s]",

@@ -127,7 +127,7 @@ class BlockPose(BlockTask):
         observe.wall_gaps(),
         Entry("share of the hold completed", "1", 0, 1, lambda w: w.memory["held"] / HOLD_STEPS),
     ]
-    meanings = {
+    explanations = {
         "goal": "x and z of the wanted place [m]",
         "heading": "wanted turn about the vertical [rad]",
         "target_face": "face to be down: 0 to 5 for -x, +x, -y, +y, -z, +z",

@@ -147,7 +147,7 @@ class BlockPush(Task):
         "astray": (-0.5, 0.5),
         "yaw": (-0.5, 0.5),
     }
-    meanings = {
+    explanations = {
         "away": "distance from the goal to the crate at the start [m]",
         "bearing": "direction from the crate to the goal at the start [rad]",
         "heading": "heading of the crate at the start [rad]",

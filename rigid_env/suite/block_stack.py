@@ -94,7 +94,7 @@ class BlockStack(Task):
         "yaw": (-np.pi / 4, np.pi / 4),
         "mass[1]": LogUniform(MASS / LARGEST_RATIO, MASS),
     }
-    meanings = {
+    explanations = {
         "apart": "distance of the centres at the start [m]",
         "bearing": "direction from B to A at the start [rad]",
         "yaw": "turn of A about the vertical at the start [rad]",

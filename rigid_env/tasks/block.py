@@ -82,7 +82,7 @@ class BlockTask(Task):
 
     actions = Wrench(0, FORCE_SHARE, TORQUE_SHARE)
     max_episode_steps = 300
-    meanings: ClassVar = {
+    explanations: ClassVar = {
         "place": "x and z of the block's centre at the start [m]",
         "yaw": "turn about the vertical at the start [rad]",
         "face": "face that is down at the start: 0 to 5 for -x, +x, -y, +y, -z, +z",

@@ -78,7 +78,7 @@ class BlockReachGoal(BlockGoal):
     """
 
     max_episode_steps = 75
-    meanings: ClassVar = {"goal": "x and z of the desired place [m]"}
+    explanations: ClassVar = {"goal": "x and z of the desired place [m]"}
     observation = (Entry(("position x", "position z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *MOTION)
     goal_entries = (Entry(("place x", "place z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *REST)
     goal_draw = "goal"
@@ -122,7 +122,7 @@ class BlockReorientGoal(BlockGoal):
     """
 
     max_episode_steps = 75
-    meanings: ClassVar = {"target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z"}
+    explanations: ClassVar = {"target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z"}
     observation = (*MOTION, Entry(("edge x", "edge y", "edge z"), "m", 0.0, BOUND, lambda w: w.drawn["size"], LENGTH))
     goal_entries = (
         Entry(("down x", "down y", "down z"), "1", -1.0, 1.0, lambda worlds: -worlds.rotation[:, 0, 1]),

@@ -25,7 +25,7 @@ class BlockReach(BlockTask):
         *entries.HOLD,
     )
     measures = ("distance", "speed", "spin")
-    meanings: ClassVar = {
+    explanations: ClassVar = {
         "goal": "x and z of the goal [m]",
         "distance": "horizontal distance of the block's centre from the goal [m]",
     }

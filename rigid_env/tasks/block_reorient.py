@@ -21,7 +21,7 @@ class BlockReorient(BlockTask):
         *entries.HOLD,
     )
     measures = ("angle", "speed", "spin")
-    meanings: ClassVar = {
+    explanations: ClassVar = {
         "target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z",
         "angle": "angle between the target face's normal and straight down [rad]",
     }

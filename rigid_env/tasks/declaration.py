@@ -34,9 +34,9 @@ class Declaration:
     camera : mapping or None
         Parameters of the `rigid_env.rendering.Camera` of `render`, such as ``{"eye": (0, 8, 20)}``; None has the room
         in view. The environment's argument of this name replaces it. Observed pictures have their own camera.
-    sight : pair of (3,) float or None
+    shown_box : pair of (3,) float or None
         Lower and upper corner of a box that pictures of `render` show besides the bodies [m]; None: no such box.
-    meanings : mapping of str to str
+    explanations : mapping of str to str
         Short explanations with units, for the tables of documentation: of measures and draws by name, of terms of the
         reward by their key in infos, such as ``reward_near``. Those of base classes hold, too.
     record_size : int
@@ -52,9 +52,9 @@ class Declaration:
     disturbances: ClassVar[Sequence] = ()
     max_episode_steps: ClassVar[int | None] = None
     ends_on_success: ClassVar[bool] = True
-    meanings: ClassVar[Mapping[str, str]] = {}
+    explanations: ClassVar[Mapping[str, str]] = {}
     camera: ClassVar[Mapping[str, Any] | None] = None
-    sight: ClassVar[tuple[Sequence[float], Sequence[float]] | None] = None
+    shown_box: ClassVar[tuple[Sequence[float], Sequence[float]] | None] = None
 
     compiled: ClassVar[Callable | None] = None
     measures: ClassVar[tuple[str, ...]] = ()

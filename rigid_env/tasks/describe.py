@@ -20,7 +20,14 @@ from rigid_env.tasks.arguments import constructor_arguments
 from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.goal import GoalTask
-from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, OWN_CAMERA, argument_meaning, draw_meaning, meanings_of
+from rigid_env.tasks.meanings import (
+    ARGUMENTS,
+    OF_ENVIRONMENTS,
+    OWN_CAMERA,
+    argument_meaning,
+    draw_meaning,
+    explanations_of,
+)
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.written import Part, sentences, written_parts
 
@@ -200,7 +207,7 @@ def _rewards(task: Task) -> Section:
 
 
 def _starts(task: Task) -> Section:
-    meanings = meanings_of(task)
+    meanings = explanations_of(task)
     rows = tuple(
         (f"`{name}`", each.describe(), str(each.length), meanings.get(name, draw_meaning(name)))
         for name, each in task.distributions.items()
@@ -243,7 +250,7 @@ def _end(task: Task) -> Section:
     limit = (
         "none" if steps is None else f"after {steps} control steps ({steps * task.control_dt:g} s), by `gymnasium.make`"
     )
-    meanings = meanings_of(task)
+    meanings = explanations_of(task)
     keys = [("is_success", "whether the task is solved")]
     keys += [(name, meanings.get(name, "measured by the task")) for name in task.measures]
     keys += [(key, meanings.get(key, "term of the reward")) for key in (f"reward_{term}" for term in task.terms)]
@@ -255,8 +262,9 @@ def _end(task: Task) -> Section:
 def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, Any]) -> Section:
     kind = type(task)
     known = {name: each.default for name, each in constructor_arguments(kind).items()}
-    meanings: dict[str, str] = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
-    meanings |= {} if task.camera is None else {"camera": OWN_CAMERA}
+    meanings = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    if task.camera is not None:
+        meanings["camera"] = OWN_CAMERA
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
     notes = (NO_DRAWS,) if isinstance(task, BlockTask) else ()

@@ -46,7 +46,7 @@ class GoalTask(Task):
 
     goal_entries: ClassVar[Sequence[Entry]]
     ends_on_success = False
-    meanings: ClassVar = {
+    explanations: ClassVar = {
         "shortfall": "distance from the goal relative to its tolerance: at most 1 where the goal is reached",
         "reward_goal": "reward of achieved and desired goal",
     }

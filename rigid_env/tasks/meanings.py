@@ -68,21 +68,21 @@ def draw_meaning(name: str) -> str:
     return f"{PARAMETERS[parameter]} of body {part}"
 
 
-def meanings_of(task: Declaration) -> dict[str, str]:
-    """Explanations that a task declares in `meanings`, those of its base classes included, by key of infos."""
+def explanations_of(task: Declaration) -> dict[str, str]:
+    """Explanations that a task declares in `explanations`, those of its base classes included, by key of infos."""
     found: dict[str, str] = {}
     for owner in reversed(type(task).__mro__):
-        found |= vars(owner).get("meanings", {})
-    return {**found, **vars(task).get("meanings", {})}
+        found |= vars(owner).get("explanations", {})
+    return {**found, **vars(task).get("explanations", {})}
 
 
-def check_meanings(task: Declaration, keys: Iterable[str]) -> None:
-    """Raise a ValueError if a task's own `meanings` explain a key that is not among the `keys` of its infos."""
-    own = vars(type(task)).get("meanings", {})
+def check_explanations(task: Declaration, keys: Iterable[str]) -> None:
+    """Raise a ValueError if a task's own `explanations` explain a key that is not among the `keys` of its infos."""
+    own = vars(type(task)).get("explanations", {})
     unknown = sorted(set(own) - set(keys))
     if unknown:
         known = ", ".join(nearest_first(unknown[0], keys))
-        raise ValueError(f"meanings of {type(task).__name__} have {unknown[0]!r}; allowed are {known}")
+        raise ValueError(f"explanations of {type(task).__name__} have {unknown[0]!r}; allowed are {known}")
 
 
 def argument_meaning(kind: type, name: str) -> str:

@@ -96,8 +96,8 @@ class SceneTask(Task):
         self.actions = [Wrench(body, **limits) for body in settings.driven]
         self.draws = self._declared()
         self._reader = reader  # for errors, as long as the task is made
-        self.meanings = {f"start_{key}": f"change of {START_MEANINGS[key]} of each body" for key in settings.start}
-        self.meanings |= {} if settings.goal is None else GOAL_MEANINGS
+        self.explanations = {f"start_{key}": f"change of {START_MEANINGS[key]} of each body" for key in settings.start}
+        self.explanations |= {} if settings.goal is None else GOAL_MEANINGS
         self.memory = {} if settings.goal is None else {"closeness": 1, "gain": 1}
         super().__init__(
             given.worlds, draws=given.draws, frame_skip=settings.frame_skip, dt=settings.dt,
