@@ -36,6 +36,9 @@ AT_OTHERS = (
 )
 
 
+FROM_ELSEWHERE = " It comes from another run: on their episodes it ends otherwise than each of the agents above."
+
+
 def results_of(env_id: str, found: Sequence[dict[str, Any]], floors: dict[str, Any], curve: str) -> list[str]:
     """Paragraphs and tables of the results of an environment.
 
@@ -135,7 +138,7 @@ def _policy(env_id: str) -> str:
     row = read_shipped().get(env_id)
     if row is None:
         return told
-    own = "" if row["seed"] is None else f" It is that of {row['algo']}, seed {row['seed']}."
+    own = f" It is that of {row['algo']}, seed {row['seed']}." if row["seed"] is not None else FROM_ELSEWHERE
     evaluation = row["evaluation"]
     return (
         f"{told}{own} It solves {rate(evaluation)} of {evaluation['episodes']:,} further episodes, on which no agent "

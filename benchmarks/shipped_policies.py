@@ -38,8 +38,20 @@ def is_same(ours: dict[str, Any], told: dict[str, Any]) -> bool:
     return is_near and all(ours[key] == told[key] for key in ("successes", "length_mean"))
 
 
+def is_near(ours: dict[str, Any], told: dict[str, Any]) -> bool:
+    """Tell whether two evaluations of the same episodes may be of one policy on two processors.
+
+    Where a rounding decides between two motions, a few episodes differ: successes by at most 5 of 1,000, and mean length
+    and return by 0.5 %.
+    """
+    has_same_means = all(isclose(ours[key], told[key], rel_tol=5e-3) for key in ("length_mean", "return_mean"))
+    return has_same_means and abs(ours["successes"] - told["successes"]) <= 5
+
+
 def find_seed(env_id: str, found: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
-    """Result, among an environment's default ones, of the agent that comes with the package; None: it is none of them.
+    """Result, among an environment's default ones, of the agent that comes with the package; None: not certain.
+
+    That is the one whose episodes the policy repeats, or else the only one whose evaluation is near.
 
     Parameters
     ----------
@@ -47,13 +59,17 @@ def find_seed(env_id: str, found: Sequence[dict[str, Any]]) -> dict[str, Any] | 
     found : sequence of dict
         Results as of `agents.suite.read_results`; those of the best agents are tried first.
     """
-    policy = load_policy(env_id)
+    policy, near = load_policy(env_id), []
     for each in sorted(found, key=lambda each: -each["evaluation"]["success_rate"]):
         told = each["evaluation"]
         arguments = {name: told[name] for name in OF_ENVIRONMENTS if name in told}
-        if each["is_default"] and is_same(evaluate(env_id, policy, told["episodes"], told["seed"], **arguments), told):
+        if not each["is_default"]:
+            continue
+        ours = evaluate(env_id, policy, told["episodes"], told["seed"], **arguments)
+        if is_same(ours, told):
             return each
-    return None
+        near += [each] if is_near(ours, told) else []
+    return near[0] if len(near) == 1 else None
 
 
 def judge(env_id: str, results: Path) -> dict[str, Any]:

@@ -98,6 +98,8 @@ def test_a_page_tells_the_policy_of_the_package(tmp_path, monkeypatch):
     monkeypatch.setattr(page_results, "read_shipped", lambda: {CURL: row})
     told = page_results._policy(CURL)
     assert "It is that of ppo, seed 3. It solves 90.0% (89.0 to 91.0) of 1,000 further episodes" in told
+    monkeypatch.setattr(page_results, "read_shipped", lambda: {CURL: {**row, "seed": None}})
+    assert "It comes from another run" in page_results._policy(CURL)
     monkeypatch.setattr(page_results, "read_shipped", dict)
     assert (
         page_results._policy(CURL)

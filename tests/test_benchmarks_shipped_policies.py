@@ -53,6 +53,9 @@ def test_a_policy_is_the_seed_whose_episodes_it_repeats(tmp_path, monkeypatch):
     found = [result(0, 7, 5.0), result(1, 8, 5.0), result(2, 8, 5.0)]
     assert program.find_seed(CURL, found)["seed"] == 2  # seed 1: another length
     assert program.find_seed(CURL, found[:2]) is None
+    close = [result(3, 12, 5.01), result(4, 12, 5.01)]  # a few other successes, and length by 0.2 %
+    assert program.find_seed(CURL, [*found[:2], close[0]])["seed"] == 3
+    assert program.find_seed(CURL, [*found[:2], *close]) is None  # two are near: not certain
     monkeypatch.setattr(program, "read_results", lambda results, env: (found, {}))
     file = tmp_path / "policies.json"
     program.main([CURL], program.RESULTS, file)

@@ -73,7 +73,7 @@ def explanations_of(task: Declaration) -> dict[str, str]:
     found: dict[str, str] = {}
     for owner in reversed(type(task).__mro__):
         found |= vars(owner).get("explanations", {})
-    return {**found, **vars(task).get("explanations", {})}
+    return {**found, **task.explanations}  # those of the task itself last
 
 
 def check_explanations(task: Declaration, keys: Iterable[str]) -> None:
