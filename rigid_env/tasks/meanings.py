@@ -39,7 +39,7 @@ OF_ENVIRONMENTS = {
 }
 """Explanations of the arguments that environments add to those of a task, by name."""
 
-OWN_CAMERA = "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None takes the task's own"
+OWN_CAMERA = "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None takes that of the task"
 """Explanation of the argument `camera` of a task that declares one."""
 
 PARAMETERS = {
