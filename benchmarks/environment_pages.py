@@ -1,8 +1,8 @@
 """Write the pages of the environments: ``python -m benchmarks.environment_pages [ENV ...] [--pictures]``.
 
 A page is made of an environment's own documentation and of what `agents.suite` kept in ``benchmarks/results/suite``;
-nothing is trained. With ``--pictures`` the trained policy that comes with an environment is played for a picture that
-moves, and the learning curves are drawn.
+`benchmarks.page_results` writes the section of results. Nothing is trained. With ``--pictures`` the trained policy that
+comes with an environment is played for a picture that moves, and the learning curves are drawn.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import gymnasium as gym
 import typer
 
 import rigid_env  # noqa: F401 (registers)
-from agents.suite import JUDGED_EPISODES, RESULTS, aggregate, read_results, short_name
+from agents.suite import RESULTS, read_results, short_name
 from benchmarks import machine
-from physics.accuracy import PRESETS
+from benchmarks.page_results import rate, results_of
 from rigid_env.envs.pretrained import pretrained_ids
 from rigid_env.envs.registration import GOALS, MAX_EPISODE_STEPS, NAMESPACE, SUITE
 from rigid_env.terminal import make_console
@@ -52,7 +52,7 @@ def page(env_id: str, results: Path = RESULTS) -> str:
     found, floors = read_results(results, env_id)
     parts = [HEAD, f"# {short_name(env_id)}", _picture(env_id), described.strip()]
     if found or floors:
-        parts.append("\n\n".join(["## Results", *_results(env_id, found, floors)]))
+        parts.append("\n\n".join(["## Results", *results_of(env_id, found, floors, _curve(env_id))]))
     parts.append(_elsewhere(env_id))
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -62,40 +62,17 @@ def _picture(env_id: str) -> str:
     return f"![A trained agent](images/{path.name})" if path.is_file() else ""
 
 
-def _results(env_id: str, found: Sequence[dict[str, Any]], floors: dict[str, Any]) -> list[str]:
-    rows = [
-        (each["algo"], each["seed"], _rate(each["evaluation"]), f"{each['steps'] / 1e6:.2f}",
-         f"{each['training_seconds']:.0f}")
-        for each in found if each["is_default"]
-    ]  # fmt: skip
-    rows += [(name, "", _rate(floor), "", "") for name, floor in floors.items()]
-    parts = [machine.markdown_table(["policy", "seed", "success of 1,000 fresh episodes", "M steps", "s"], rows)]
-    parts += [_whole(algo, [each for each in found if each["is_default"] and each["algo"] == algo])
-              for algo in sorted({each["algo"] for each in found if each["is_default"]})]  # fmt: skip
-    curve = PICTURES / f"{short_name(env_id)}-curve.png"
-    parts += [f"![Learning curves](images/{curve.name})"] if curve.is_file() else []
-    judged = [each for each in found if each.get("judged")]
-    if judged:
-        parts += [
-            f"Trained at one accuracy, judged at another: success of {JUDGED_EPISODES} episodes.",
-            machine.markdown_table(
-                ["trained at", "seed", *PRESETS],
-                [(_accuracy(each), each["seed"], *(f"{each['judged'][name]['success_rate']:.1%}" for name in PRESETS))
-                 for each in judged],
-            ),
-        ]  # fmt: skip
-    if found:
-        parts.append(f"`python -m agents.suite {env_id}` on {machine.headline(found[0]['machine'])}.")
-    if env_id in pretrained_ids():
-        parts.append(f"A trained policy comes with the package: `rigid-env play {env_id}`.")
-    return parts
+def _curve(env_id: str) -> str:
+    path = PICTURES / f"{short_name(env_id)}-curve.png"
+    return f"![Learning curves](images/{path.name})" if path.is_file() else ""
 
 
 def _elsewhere(env_id: str, file: Path = TWINS) -> str:
     """Return the success of policies in MuJoCo, of an environment with a twin that `judge_elsewhere` has judged."""
     kept = json.loads(file.read_text(encoding="utf-8"))
+    engines = ("ours", *kept["settings"])
     rows = [
-        (each["policy"], *(_rate(each["judged"][engine]) for engine in ("ours", *kept["settings"])))
+        (_policy_name(env_id, each["policy"]), *(rate(each["judged"][engine]) for engine in engines))
         for each in kept["rows"] if each["env"] == env_id
     ]  # fmt: skip
     if not rows:
@@ -105,26 +82,8 @@ def _elsewhere(env_id: str, file: Path = TWINS) -> str:
     return "\n\n".join(["## Judged in another engine", told, machine.markdown_table(heads, rows)])
 
 
-def _rate(evaluation: dict[str, Any]) -> str:
-    low, high = evaluation["interval"]
-    return f"{evaluation['success_rate']:.1%} ({100 * low:.1f} to {100 * high:.1f})"
-
-
-def _whole(algo: str, found: Sequence[dict[str, Any]]) -> str:
-    """Return the sentence that sums up the seeds of an algorithm; none for a single one."""
-    if len(found) < 2:
-        return f"One seed of {algo} was run: it says little about others."
-    whole = aggregate(found)
-    low, high = whole["interval"]
-    return (
-        f"Interquartile mean of {whole['seeds']} seeds of {algo}: {whole['success']:.1%} "
-        f"({100 * low:.1f} to {100 * high:.1f}, bootstrap, 95 %), after {whole['seconds']:.0f} s."
-    )
-
-
-def _accuracy(result: dict[str, Any]) -> str:
-    value = result["accuracy"]
-    return value if isinstance(value, str) else ", ".join(f"{name} {number:g}" for name, number in value.items())
+def _policy_name(env_id: str, name: str) -> str:
+    return "that of the package" if name == short_name(env_id) else name
 
 
 def index() -> str:
@@ -134,9 +93,9 @@ def index() -> str:
         text = page_of(env_id).read_text(encoding="utf-8")
         first = re.search(r"## Description\n\n(.+?\.)(?:\s|$)", text, re.DOTALL)
         about = " ".join(first[1].split()) if first else ""
-        rate = re.search(r"^Interquartile mean of .*?: ([\d.]+%)", text, re.MULTILINE)
-        rate = rate or re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+%)", text, re.MULTILINE)
-        rows.append((f"[{short_name(env_id)}]({short_name(env_id)}.md)", about, rate[1] if rate else ""))
+        found = re.search(r"^Interquartile mean of .*?: ([\d.]+%)", text, re.MULTILINE)
+        found = found or re.search(r"^\| (?:ppo|sac) \| \d+ \| ([\d.]+%)", text, re.MULTILINE)
+        rows.append((f"[{short_name(env_id)}]({short_name(env_id)}.md)", about, found[1] if found else ""))
     table = machine.markdown_table(["environment", "what the agent does", "trained"], rows)
     ids = f'The id of each is `{NAMESPACE}/` and its name: `gymnasium.make("{NAMESPACE}:{NAMESPACE}/BlockReach-v0")`.'
     return f"{HEAD}\n\n# Every environment\n\n{ids}\n\n{table}\n"

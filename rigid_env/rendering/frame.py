@@ -157,26 +157,30 @@ class GoalView:
     pos : (3,) float or None
         Target of the body's centre, world frame [m]; a disc is drawn on the floor below it. None: no disc.
     radius : float
-        Radius of the disc [m].
+        Radius of the disc or ring [m].
     reached : bool
         Whether the goal is reached; it chooses the colour.
     goal_face : int or None
         Face of body 0 (a block) to highlight: 0..5 = -x, +x, -y, +y, -z, +z of the body's axes.
+    axis : (3,) float or None
+        Unit vector of the axis of a ring that is drawn around `pos` itself, on a stand; it replaces the disc.
 
     Raises
     ------
     ValueError
-        If `goal_face` is not 0..5 or `pos` not of shape (3,).
+        If `goal_face` is not 0..5, or `pos` or `axis` not of shape (3,).
     """
 
     pos: np.ndarray | None = None
     radius: float = 1.0
     reached: bool = False
     goal_face: int | None = None
+    axis: np.ndarray | None = None
 
     def __post_init__(self):
-        if self.pos is not None:
-            _set_array(self, "pos", (3,))
+        for name in ("pos", "axis"):
+            if getattr(self, name) is not None:
+                _set_array(self, name, (3,))
         if self.goal_face is not None and self.goal_face not in range(FACE_COUNT):
             raise ValueError(f"goal_face must be 0..{FACE_COUNT - 1}, not {self.goal_face!r}")
 

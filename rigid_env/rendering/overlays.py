@@ -31,6 +31,9 @@ AXIS_WIDTH = 1.8
 PATH_WIDTH = 2.2
 """Width of the line along a body's path [canvas units]."""
 
+RING_WIDTH = 2.4
+"""Width of a goal's ring in the air, and of its stand [canvas units]."""
+
 TORQUE_STEP = np.radians(6.0)
 DISC_CORNERS = 72
 GOAL_ALPHA = 46
@@ -41,7 +44,8 @@ NEAR_WALL_ALPHA = 12
 def draw_goal(canvas, goal, room):
     """Draw a disc with ring and centre mark on the floor of a `Room`, below the target of a `GoalView`.
 
-    Nothing is drawn if the goal is None or has no target.
+    A goal with an axis is a ring around the target instead, on a stand. Nothing is drawn if the goal is None or has no
+    target.
     """
     if goal is None or goal.pos is None:
         return
@@ -50,6 +54,9 @@ def draw_goal(canvas, goal, room):
     height = normal @ goal.pos - floors[0].offset if floors else 0.0
     foot = goal.pos - height * normal
     colour = goal_colour(goal)
+    if goal.axis is not None:
+        _draw_ring(canvas, goal, foot, colour)
+        return
     axes = plane_axes(normal)
     ring = _circle(foot, axes, goal.radius, np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False))
     canvas.polygon(ring, colour, GOAL_ALPHA)
@@ -58,6 +65,16 @@ def draw_goal(canvas, goal, room):
     canvas.loop(inner, 0.7, palette.mix(colour, palette.FLOOR, 0.35))
     arms = 0.16 * goal.radius * np.stack(axes)
     canvas.segments(foot - arms, foot + arms, 1.4, colour)
+
+
+def _draw_ring(canvas, goal, foot, colour):
+    """Draw the ring of a `GoalView`, with a line from its lowest point to `foot` (3,) [m] on the floor."""
+    turns = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False)
+    ring = _circle(goal.pos, plane_axes(goal.axis), goal.radius, turns)
+    canvas.polygon(ring, colour, GOAL_ALPHA)
+    canvas.loop(ring, RING_WIDTH, colour)
+    lowest = ring[np.argmin(np.linalg.norm(ring - foot, axis=1))]
+    canvas.segments(lowest[None], foot[None], RING_WIDTH, palette.mix(colour, palette.FLOOR, 0.35))
 
 
 def draw_path(canvas, frame, room):

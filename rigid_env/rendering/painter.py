@@ -145,7 +145,8 @@ class Painter:
 
     def _key(self, frame):
         goal = frame.goal
-        place = goal and (goal.pos is not None and (*goal.pos.tolist(), goal.radius, goal.reached))
+        axis = () if goal is None or goal.axis is None else tuple(goal.axis.tolist())
+        place = goal and (goal.pos is not None and (*goal.pos.tolist(), goal.radius, goal.reached, axis))
         return *self._room_key(frame), place
 
     def _room_key(self, frame):

@@ -145,7 +145,9 @@ def write_gif(path: Path, pictures: Sequence[np.ndarray], fps: float, colours: i
         Number of colours of all pictures together.
     """
     images = [_image_class().fromarray(picture) for picture in pictures]
-    palette = images[len(images) // 2].quantize(colours)
+    typical = np.concatenate([pictures[k * (len(pictures) - 1) // 3] for k in range(4)])
+    # an octree keeps the colours of small bodies and arrows, which a median cut gives to the floor
+    palette = _image_class().fromarray(typical).quantize(colours, method=_image_class().Quantize.FASTOCTREE)
     images = [image.quantize(colours, palette=palette, dither=0) for image in images]
     images[0].save(path, save_all=True, append_images=images[1:], duration=round(1000 / fps), loop=0)
 

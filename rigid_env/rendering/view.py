@@ -15,6 +15,9 @@ from rigid_env.rendering.geometry import rotation_matrix
 from rigid_env.rendering.picture import WEIGHT_ARROW, world_frame
 from rigid_env.tasks import Task
 
+NO_WEIGHT = 1.0
+"""Force that is as long as a weight where no body has one [N]."""
+
 RenderMode = Literal["rgb_array", "human"]
 """Type of the argument `render_mode`: one of `RENDER_MODES`."""
 
@@ -40,13 +43,24 @@ def frame_of(task: Task, world: int = 0, arrows: bool = True) -> Frame:
     mark = task.goal_mark(world)
     goal = None if mark is None else GoalView(**mark)
     frame = world_frame(task.world, world, task.lines(world), goal, task.load[world], arrows=arrows)
-    return replace(frame, force_scale=WEIGHT_ARROW / task.weights[world, 0])
+    return replace(frame, force_scale=WEIGHT_ARROW / (task.weights[world].max() or NO_WEIGHT))
 
 
 def room_of(task: Task) -> Room:
     """Part of space that pictures of a task show, the same for all its worlds and episodes."""
     frame = world_frame(task.world, arrows=False)
     return make_room(frame.walls, frame.bodies, bounds_of(task.world.scene))
+
+
+def seen_of(task: Task) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner (3,) [m] of the box that pictures of a task show: its bodies, and its `shown_box`.
+
+    Observed pictures leave `shown_box` out; see `room_of`.
+    """
+    lower, upper = bounds_of(task.world.scene)
+    if task.shown_box is None:
+        return lower, upper
+    return np.minimum(lower, task.shown_box[0]), np.maximum(upper, task.shown_box[1])
 
 
 def bounds_of(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -120,10 +134,14 @@ class View:
 
     def draw(self, task: Task, world: int = 0) -> np.ndarray:
         """Draw one world of a task: returns (height, width, 3) uint8; the mode "human" shows it in the window, too."""
+        return self.draw_frame(task, frame_of(task, world, self.arrows))
+
+    def draw_frame(self, task: Task, frame: Frame) -> np.ndarray:
+        """Draw a frame in the room of a task, with the user's camera or that of the task; as `draw`."""
         if self._renderer is None:
-            bounds = bounds_of(task.world.scene)
-            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, self.camera, bounds)
-        return self._renderer.draw(frame_of(task, world, self.arrows))
+            camera = self.camera or as_camera(task.camera, f"camera of {type(task).__name__}")
+            self._renderer = Renderer(self.width, self.height, self.mode, self.fps, self.title, camera, seen_of(task))
+        return self._renderer.draw(frame)
 
     def close(self) -> None:
         """Close the window, if there is one; further calls do nothing."""

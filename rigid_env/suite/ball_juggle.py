@@ -134,6 +134,17 @@ class BallJuggle(Task):
         "aside": Uniform((-ASIDE, -ASIDE), (ASIDE, ASIDE)),
         "drift": Uniform((-DRIFT, -DRIFT), (DRIFT, DRIFT)),
     }
+    explanations = {
+        "wanted": "wanted apex, a height over the block's place at rest [m]",
+        "restitution": "restitution of ball and block",
+        "release": "height of the ball's centre at the start [m]",
+        "aside": "x and z of the ball at the start [m]",
+        "drift": "velocity of the ball along x and z at the start [m/s]",
+        "apex": "height of the apex of the present flight [m]",
+        "reward_progress": "gain of the potential",
+        "reward_lost": "-1 for a lost ball",
+        "reward_success": "bonus for success",
+    }
     memory = {"apex": 1, "rise": 1, "row": 1, "potential": 1}
     max_episode_steps = 300
 

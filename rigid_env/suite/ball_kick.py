@@ -138,6 +138,16 @@ class BallKick(Task):
         "side": Uniform(-SIDE, SIDE),
         "wind": Uniform((-5.0, -5.0), (5.0, 5.0)),
     }
+    explanations = {
+        "ring": "centre of the ring [m]",
+        "side": "place of the post along z, beside the line from ball to ring [m]",
+        "wind": "velocity of the air along x and z [m/s]",
+        "miss": "least distance between ball and centre of the ring so far [m]",
+        "reward_miss": "minus a function of the miss, once the flight is over",
+        "reward_success": "bonus for success",
+    }
+    camera = {"eye": (-7.0, 6.9, 5.0), "target": (8.3, -0.3, -1.1), "fov_y": 35.0}  # a free kick, from behind
+    shown_box = ((-2.0, 0.0, -5.0), (24.0, 4.0, 5.0))
     memory = {"place": 3, "velocity": 3, "miss": 1, "wind": 2}
     max_episode_steps = FLIGHT
 
@@ -197,9 +207,9 @@ class BallKick(Task):
         }
 
     def goal_mark(self, world):
-        """Disc of the ring's radius, on the ground below it."""
+        """Ring around its centre, across the x axis."""
         is_reached = bool(self.memory_arrays["miss"][world] < RING)
-        return {"pos": tuple(self.drawn["ring"][world]), "radius": RING, "reached": is_reached}
+        return {"pos": self.drawn["ring"][world], "axis": (1.0, 0.0, 0.0), "radius": RING, "reached": is_reached}
 
 
 def fly(velocity, spin, wind, distance):

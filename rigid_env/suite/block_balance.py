@@ -72,8 +72,8 @@ class BlockBalance(Task):
 
     ## Episode End
 
-    Failure: the lean exceeds 0.5 rad. Truncation after 240 control steps (12 s), which is a success. `info` holds
-    `lean` [rad] and `upright` [s], the time that it has stood.
+    Failure: the lean exceeds 0.5 rad. Truncation after 240 control steps (12 s). A block that still stands then is a
+    success. `info` holds `lean` [rad] and `upright` [s], the time that it has stood.
 
     ## Version History
 
@@ -98,6 +98,14 @@ class BlockBalance(Task):
         observe.linvel(0, SPEED, 5),
         observe.angvel(0, SPIN, 5),
     ]
+    explanations = {
+        "start_lean": "lean about the z axis at the start [rad]",
+        "yaw": "turn about the vertical after the lean [rad]",
+        "lean": "angle between the vertical and the line from contact to centre [rad]",
+        "upright": "time that the block has stood [s]",
+        "reward_upright": "time of the control step [s]",
+        "reward_effort": "cost of the squared action",
+    }
     memory = {"axis": 3}
     draws = {"start_lean": (-START_LEAN, START_LEAN), "yaw": (-np.pi, np.pi)}
     disturbances = [Push(0, speed=(0.1, 0.3), every=2.0), Gust(0, force=(0.0, 0.05), lasts=(0.3, 1.0), every=3.0)]

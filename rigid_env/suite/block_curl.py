@@ -142,6 +142,15 @@ class BlockCurl(Task):
         Entry("share of the push that is left", "1", 0, 1, lambda w: np.maximum(1.0 - w.steps / PUSHED, 0.0)),
     ]
     draws = {"goal": Ring(), "friction": FRICTION}
+    explanations = {
+        "goal": "x and z of the mark [m]",
+        "distance": "distance from the mark [m]",
+        "miss": "distance from the mark at which the stone would stop without a further push [m]",
+        "regret": "largest return less the return so far",
+        "reward_nearer": "decrease of the miss [m]",
+        "reward_effort": "cost of the squared force",
+        "reward_success": "bonus for success",
+    }
     memory = {"effort": 1, "miss": 1}
     max_episode_steps = 200
 

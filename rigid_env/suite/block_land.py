@@ -119,6 +119,22 @@ class BlockLand(Task):
         "angvel": Uniform(3 * (-SPIN,), 3 * (SPIN,)),
         "target_face": Choice(range(6)),
     }
+    explanations = {
+        "height": "height of the centre at the start [m]",
+        "attitude": "quaternion w, x, y, z at the start",
+        "linvel": "velocity at the start [m/s]",
+        "angvel": "angular velocity at the start [rad/s]",
+        "target_face": "face to be down: 0 to 5 for -x, +x, -y, +y, -z, +z",
+        "angle": "angle between the target face's normal and straight down [rad]",
+        "speed": "speed of the block's centre [m/s]",
+        "spin": "length of the angular velocity [rad/s]",
+        "peak": "largest impulse of impacts in one control step so far, over the weight [s]",
+        "left": "rest of the budget [s]",
+        "reward_progress": "gain of the potential",
+        "reward_peak": "cost of a larger peak",
+        "reward_time": "cost of time",
+        "reward_success": "bonus for success",
+    }
     memory = {"spent": 1, "peak": 1, "held": 1, "still": 1, "potential": 1}
     max_episode_steps = 120
 

@@ -127,6 +127,16 @@ class BlockPose(BlockTask):
         observe.wall_gaps(),
         Entry("share of the hold completed", "1", 0, 1, lambda w: w.memory["held"] / HOLD_STEPS),
     ]
+    explanations = {
+        "goal": "x and z of the wanted place [m]",
+        "heading": "wanted turn about the vertical [rad]",
+        "target_face": "face to be down: 0 to 5 for -x, +x, -y, +y, -z, +z",
+        "distance": "horizontal distance of the centre from its place [m]",
+        "tilt": "angle between the target face's normal and straight down [rad]",
+        "heading_error": "part about the vertical of the turn that is left [rad]",
+        "turn": "angle of the whole turn that is left [rad]",
+        "reward_time": "cost of time",
+    }
     memory = {"held": 1, "potential": 1}
     goal_draw = "goal"
     max_episode_steps = 300

@@ -140,12 +140,27 @@ class BlockPush(Task):
     draws = {
         "mass[1]": (4.0, 10.0),
         "friction": (0.3, 0.5),
-        "away": (0.5, 2.5),  # distance from the goal to the crate [m]
-        "bearing": (-np.pi, np.pi),  # direction from the crate to the goal [rad]
-        "heading": (-0.8, 0.8),  # heading of the crate at the start [rad]
-        "apart": (1.3, 2.0),  # distance from the crate to the pusher [m]
-        "astray": (-0.5, 0.5),  # angle of the pusher off the line from goal to crate, at the crate [rad]
-        "yaw": (-0.5, 0.5),  # angle of the pusher's heading off the direction to the crate [rad]
+        "away": (0.5, 2.5),
+        "bearing": (-np.pi, np.pi),
+        "heading": (-0.8, 0.8),
+        "apart": (1.3, 2.0),
+        "astray": (-0.5, 0.5),
+        "yaw": (-0.5, 0.5),
+    }
+    explanations = {
+        "away": "distance from the goal to the crate at the start [m]",
+        "bearing": "direction from the crate to the goal at the start [rad]",
+        "heading": "heading of the crate at the start [rad]",
+        "apart": "distance from the crate to the pusher at the start [m]",
+        "astray": "angle of the pusher off the line from goal to crate, at the crate [rad]",
+        "yaw": "angle of the pusher's heading off the direction to the crate [rad]",
+        "distance": "distance of the crate from its place [m]",
+        "heading_error": "error of the crate's heading [rad]",
+        "speed": "speed of the crate [m/s]",
+        "spin": "length of the crate's angular velocity [rad/s]",
+        "reward_progress": "gain of the potential",
+        "reward_time": "cost of time",
+        "reward_success": "bonus for success",
     }
     memory = {"held": 1, "potential": 1}
     max_episode_steps = 300

@@ -89,10 +89,21 @@ class BlockStack(Task):
         Entry("logarithm of the mass ratio", "1", 0, 1, lambda w: np.log(MASS / w.drawn["mass[1]"]) / LOG_LARGEST),
     ]
     draws = {
-        "apart": (1.8, 3.0),  # distance of the centres [m]
-        "bearing": (-np.pi, np.pi),  # direction from B to A [rad]
-        "yaw": (-np.pi / 4, np.pi / 4),  # yaw of A [rad]
+        "apart": (1.8, 3.0),
+        "bearing": (-np.pi, np.pi),
+        "yaw": (-np.pi / 4, np.pi / 4),
         "mass[1]": LogUniform(MASS / LARGEST_RATIO, MASS),
+    }
+    explanations = {
+        "apart": "distance of the centres at the start [m]",
+        "bearing": "direction from B to A at the start [rad]",
+        "yaw": "turn of A about the vertical at the start [rad]",
+        "distance": "distance of A from its place on B [m]",
+        "moved": "distance of B from its place at the start [m]",
+        "held": "time that A has been at rest on B [s]",
+        "reward_progress": "decrease of A's way [m] and tilt",
+        "reward_held": "gain of the longest time of rest",
+        "reward_success": "bonus for success",
     }
     memory = {"held": 1, "longest": 1, "place": 3, "to_go": 1}
     max_episode_steps = 240

@@ -82,6 +82,16 @@ class BlockTask(Task):
 
     actions = Wrench(0, FORCE_SHARE, TORQUE_SHARE)
     max_episode_steps = 300
+    explanations: ClassVar = {
+        "place": "x and z of the block's centre at the start [m]",
+        "yaw": "turn about the vertical at the start [rad]",
+        "face": "face that is down at the start: 0 to 5 for -x, +x, -y, +y, -z, +z",
+        "speed": "speed of the block's centre [m/s]",
+        "spin": "length of the angular velocity [rad/s]",
+        "reward_progress": "gain of the potential",
+        "reward_effort": "cost of the step and of the squared action",
+        "reward_success": "bonus for success",
+    }
     record_size = col.RECORD_SIZE
     terms = ("progress", "effort", "success")
     goal_draw: ClassVar[str | None] = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from rigid_env.tasks import observe
@@ -62,9 +64,21 @@ class BlockReachGoal(BlockGoal):
     The block, the box and the actions are those of `rigid_env.BlockReachEnv`, at 100 ms for a control step. An
     observation is a dict. A goal has four numbers: x and z of the block's centre [5 m], its speed [m/s] and its spin
     [rad/s]. The desired goal has speed and spin 0. It is reached within 0.3 m, 0.1 m/s and 0.1 rad/s.
+
+    ## Rewards
+
+    Both rewards follow from the shortfall `s = max(d / 0.3, v / 0.1, w / 0.1)`. Here d is the distance of the centre
+    from the desired place [m], v the speed [m/s] and w the spin [rad/s], all of the observed goals.
+    `reward="sparse"`: 0 if `s <= 1`, else -1. `reward="dense"`: `-s`.
+
+    ## Episode End
+
+    Termination: never. Success is `s <= 1`, in every control step anew: the goal has to be kept. An evaluation counts
+    the last control step of the episode. `info` holds `shortfall`, the s of the rewards.
     """
 
     max_episode_steps = 75
+    explanations: ClassVar = {"goal": "x and z of the desired place [m]"}
     observation = (Entry(("position x", "position z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *MOTION)
     goal_entries = (Entry(("place x", "place z"), "m", -BOUND, BOUND, lambda w: w.pos[:, 0, ::2], LENGTH), *REST)
     goal_draw = "goal"
@@ -94,9 +108,21 @@ class BlockReorientGoal(BlockGoal):
     observation is a dict. A goal has five numbers: the direction straight down in the body frame (x, y, z), speed [m/s]
     and spin [rad/s]. In the desired goal the direction is the outward normal of a face, and speed and spin are 0. It is
     reached within 0.1 rad, 0.1 m/s and 0.1 rad/s.
+
+    ## Rewards
+
+    Both rewards follow from the shortfall `s = max(a / 0.1, v / 0.1, w / 0.1)`. Here a is the angle between the desired
+    face's normal and straight down [rad], v the speed [m/s] and w the spin [rad/s], all of the observed goals.
+    `reward="sparse"`: 0 if `s <= 1`, else -1. `reward="dense"`: `-s`.
+
+    ## Episode End
+
+    Termination: never. Success is `s <= 1`, in every control step anew: the goal has to be kept. An evaluation counts
+    the last control step of the episode. `info` holds `shortfall`, the s of the rewards.
     """
 
     max_episode_steps = 75
+    explanations: ClassVar = {"target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z"}
     observation = (*MOTION, Entry(("edge x", "edge y", "edge z"), "m", 0.0, BOUND, lambda w: w.drawn["size"], LENGTH))
     goal_entries = (
         Entry(("down x", "down y", "down z"), "1", -1.0, 1.0, lambda worlds: -worlds.rotation[:, 0, 1]),

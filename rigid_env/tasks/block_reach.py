@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from rigid_env.tasks import block_entries as entries
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
@@ -23,6 +25,10 @@ class BlockReach(BlockTask):
         *entries.HOLD,
     )
     measures = ("distance", "speed", "spin")
+    explanations: ClassVar = {
+        "goal": "x and z of the goal [m]",
+        "distance": "horizontal distance of the block's centre from the goal [m]",
+    }
     goal_draw = "goal"
     error_name = "distance"
     compiled = staticmethod(kernels.observe_reach)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from rigid_env.tasks import block_entries as entries
 from rigid_env.tasks import kernels
 from rigid_env.tasks import layout as col
@@ -19,6 +21,10 @@ class BlockReorient(BlockTask):
         *entries.HOLD,
     )
     measures = ("angle", "speed", "spin")
+    explanations: ClassVar = {
+        "target_face": "face to be turned down: 0 to 5 for -x, +x, -y, +y, -z, +z",
+        "angle": "angle between the target face's normal and straight down [rad]",
+    }
     goal_draw = "target_face"
     error_name = "angle"
     compiled = staticmethod(kernels.observe_reorient)

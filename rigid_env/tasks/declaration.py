@@ -31,6 +31,14 @@ class Declaration:
     measures, terms : tuple of str
         Only for a compiled task: names of the numbers, and of the terms of the reward, that the kernel writes into
         `outcome` after reward, success and failure.
+    camera : mapping or None
+        Parameters of the `rigid_env.rendering.Camera` of `render`, such as ``{"eye": (0, 8, 20)}``; None has the room
+        in view. The environment's argument of this name replaces it. Observed pictures have their own camera.
+    shown_box : pair of (3,) float or None
+        Lower and upper corner of a box that pictures of `render` show besides the bodies [m]; None: no such box.
+    explanations : mapping of str to str
+        Short explanations with units, for the tables of documentation: of measures and draws by name, of terms of the
+        reward by their key in infos, such as ``reward_near``. Those of base classes hold, too.
     record_size : int
         Only for a compiled task: length of each world's row in `record`, the kernel's memory. `note_episodes` writes
         drawn values into it.
@@ -44,6 +52,9 @@ class Declaration:
     disturbances: ClassVar[Sequence] = ()
     max_episode_steps: ClassVar[int | None] = None
     ends_on_success: ClassVar[bool] = True
+    explanations: ClassVar[Mapping[str, str]] = {}
+    camera: ClassVar[Mapping[str, Any] | None] = None
+    shown_box: ClassVar[tuple[Sequence[float], Sequence[float]] | None] = None
 
     compiled: ClassVar[Callable | None] = None
     measures: ClassVar[tuple[str, ...]] = ()
@@ -119,6 +130,7 @@ class Declaration:
         -------
         dict or None
             Arguments of `rigid_env.rendering.GoalView`: ``pos`` (3,) of a disc on the floor and its ``radius`` [m],
-            or ``goal_face`` of body 0; ``reached`` chooses the colour. None: no goal is drawn.
+            or ``goal_face`` of body 0; ``reached`` chooses the colour. With ``axis`` (3,) a ring around ``pos`` itself
+            replaces the disc. None: no goal is drawn.
         """
         return None

@@ -17,16 +17,36 @@ from physics.scene.body_names import body_label
 from physics.summary import counted
 from rigid_env.tasks.actions import FORCE, IMPULSE, TORQUE
 from rigid_env.tasks.arguments import constructor_arguments
+from rigid_env.tasks.block import BlockTask
 from rigid_env.tasks.declaration import Declaration
 from rigid_env.tasks.goal import GoalTask
-from rigid_env.tasks.meanings import ARGUMENTS, OF_ENVIRONMENTS, argument_meaning, draw_meaning
+from rigid_env.tasks.meanings import (
+    ARGUMENTS,
+    OF_ENVIRONMENTS,
+    OWN_CAMERA,
+    argument_meaning,
+    draw_meaning,
+    explanations_of,
+)
 from rigid_env.tasks.task import Task
 from rigid_env.tasks.written import Part, sentences, written_parts
 
 WIDTH = 79  # largest length of a line of text [characters]
 
-REACH = "longest half extent, of a hull the farthest along a body axis from the centre of mass"
-"""Explanation of a body's reach, the length in the unit of torques."""
+REACH = "the reach of the body (longest half extent, of a hull the farthest along a body axis from the centre of mass)"
+"""Length in the unit of torques."""
+
+HALF_EDGE = "the longest half edge of the body"
+"""This length where all bodies are blocks."""
+
+ROTATION = "R is the rotation matrix from body to world, by rows."
+"""Explanation of entries such as R[0, 0]."""
+
+NO_DRAWS = (
+    "There is no argument `draws`: `mass`, `size`, `friction`, `restitution` and `gravity` take a pair (low, high) or "
+    "a distribution instead, and `reset(options=...)` fixes any draw of an episode."
+)
+"""Note about the block's tasks."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +140,7 @@ def sections(
 
 def _description(task: Task, documented: type) -> Section:
     scene, doc = task.world.scene, inspect.cleandoc(documented.__doc__ or "")
-    bodies = "; ".join(f"{_kind(i, body)}{_mass(body)}" for i, body in enumerate(scene.bodies))
+    bodies = "; ".join(f"{_kind(i, body)}{_mass(task, i, body)}" for i, body in enumerate(scene.bodies))
     effects = counted(type(effect).__name__ for effect in scene.effects)
     text = f"Bodies: {bodies}. Walls: {len(scene.walls)}. Effects: {effects}."
     return Section("Description", tuple(_paragraphs(doc)), after=(text,))
@@ -140,7 +160,9 @@ def _actions(task: Task) -> Section:
     kinds = {vector.kind for vector in task.action_vectors}
     has_loads = bool(kinds & {FORCE, TORQUE, IMPULSE})
     notes = ["m is the mass of the body, g gravity (9.81 m/s² where there is none)"] if has_loads else []
-    notes += [f"a is the reach of the body ({REACH})"] if TORQUE in kinds else []
+    if TORQUE in kinds:
+        has_blocks_only = all(body.kind == "block" for body in task.world.scene.bodies)
+        notes += [f"a is {HALF_EDGE if has_blocks_only else REACH}"]
     notes += ["Each number is clipped to ±1, then a vector is shortened to length 1 where it is longer"]
     text = f"{'. '.join(notes)}."
     text += " An impulse acts in the first physics step." if IMPULSE in kinds else ""
@@ -173,6 +195,7 @@ def _observation(task: Task) -> Section:
             f"{task.goals.size} float32 each."
         )
     text += " Each number is told in its unit and clipped to its bounds."
+    text += f" {ROTATION}" if any("R[" in row[1] for row in rows) else ""
     columns = ("Num", "Observation", "Min", "Max", "Unit", *(("Agents",) if views else ()))
     return Section("Observation Space", (text,), columns, rows)
 
@@ -184,8 +207,9 @@ def _rewards(task: Task) -> Section:
 
 
 def _starts(task: Task) -> Section:
+    meanings = explanations_of(task)
     rows = tuple(
-        (f"`{name}`", each.describe(), str(each.length), draw_meaning(name))
+        (f"`{name}`", each.describe(), str(each.length), meanings.get(name, draw_meaning(name)))
         for name, each in task.distributions.items()
         if name in task.own_draws
     )
@@ -215,16 +239,21 @@ def _disturbances(task: Task) -> tuple[Section, ...]:
 
 def _end(task: Task) -> Section:
     ends = [name for name in ("success", "failure") if getattr(type(task), name) is not getattr(Declaration, name)]
-    text = f"Termination: {' and '.join(f'on {name}' for name in ends) or 'never'}."
+    told = [name for name in ends if name != "success" or task.ends_on_success]
+    text = f"Termination: {' and '.join(f'on {name}' for name in told) or 'never'}."
     if task.compiled is not None:
         text = "Termination: on success and on failure, as the compiled function decides."
+    elif told != ends:
+        text += " Success does not end an episode."
     own = (paragraph for name in ends for paragraph in _own_text(task, name))
     steps = task.max_episode_steps
     limit = (
         "none" if steps is None else f"after {steps} control steps ({steps * task.control_dt:g} s), by `gymnasium.make`"
     )
-    keys = [("is_success", "whether the task is solved"), *((name, "measured by the task") for name in task.measures)]
-    keys += [(f"reward_{term}", "term of the reward") for term in task.terms]
+    meanings = explanations_of(task)
+    keys = [("is_success", "whether the task is solved")]
+    keys += [(name, meanings.get(name, "measured by the task")) for name in task.measures]
+    keys += [(key, meanings.get(key, "term of the reward")) for key in (f"reward_{term}" for term in task.terms)]
     keys += [("physics_status", "a `physics.Status`: 0 when nothing went wrong")]
     rows = tuple((f"`{key}`", meaning) for key, meaning in keys)
     return Section("Episode End", (" ".join([text, *own]), f"Truncation: {limit}."), ("In `info`", "Meaning"), rows)
@@ -234,9 +263,12 @@ def _arguments(task: Task, added: Mapping[str, Any], registered: Mapping[str, An
     kind = type(task)
     known = {name: each.default for name, each in constructor_arguments(kind).items()}
     meanings = {**{name: argument_meaning(kind, name) for name in known}, **ARGUMENTS, **OF_ENVIRONMENTS}
+    if task.camera is not None:
+        meanings["camera"] = OWN_CAMERA
     defaults = {**known, **added}
     rows = tuple((f"`{name}`", _default(registered.get(name, defaults[name])), meanings[name]) for name in defaults)
-    return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows)
+    notes = (NO_DRAWS,) if isinstance(task, BlockTask) else ()
+    return Section("Arguments", (), ("Argument", "Default", "Meaning"), rows, notes)
 
 
 # --- sections that a docstring contains -------------------------------------------------------------------------------
@@ -252,23 +284,27 @@ def _merged(section: Section, part: Part) -> Section:
         words = sentences(part.text, lambda text: "float32" not in text and text[-1] != ":" and text not in told)
         return replace(section, after=words)
     if title == "Episode End":
-        words = sentences(part.text, lambda text: not text.startswith("Truncation: "))
+        words = sentences(part.text, lambda text: not text.startswith("Truncation"))
         return replace(section, before=(*words, *section.before[1:]))
     if title == "Arguments":
         meanings = {row[0]: row[-1] for row in part.rows}
         meanings.setdefault("`threads`", ARGUMENTS["threads"])  # an argument of batches alone
         rows = tuple((*row[:-1], meanings[row[0]]) for row in section.rows if row[0] in meanings)
         rows = rows if part.rows else section.rows
-        return replace(section, rows=rows, before=part.before, after=part.after)
+        return replace(section, rows=rows, before=part.before, after=(*part.after, *section.after))
     return replace(section, before=part.text)
 
 
 # --- parts of sections ------------------------------------------------------------------------------------------------
 
 
-def _mass(body: Body) -> str:
+def _mass(task: Task, index: int, body: Body) -> str:
+    """Mass of a body in the list of bodies; "mass drawn" if episodes draw it from a range."""
     if body.motion is not None:
         return ", which moves as prescribed"
+    draws = (task.distributions.get(name) for name in ("mass", f"mass[{index}]", f"mass[{body.name}]"))
+    if any(each is not None and not each.is_fixed for each in draws):
+        return ", mass drawn"
     return ", fixed" if body.fixed else f" of {body.mass:g} kg"
 
 

@@ -46,6 +46,10 @@ class GoalTask(Task):
 
     goal_entries: ClassVar[Sequence[Entry]]
     ends_on_success = False
+    explanations: ClassVar = {
+        "shortfall": "distance from the goal relative to its tolerance: at most 1 where the goal is reached",
+        "reward_goal": "reward of achieved and desired goal",
+    }
 
     def __init__(self, worlds: int = 1, *, reward: str = "sparse", **settings):
         self.reward = validation.one_of(reward, REWARDS, "reward")

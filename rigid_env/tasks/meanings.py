@@ -1,12 +1,18 @@
-"""Short explanations of arguments and draws, for the tables in a task's documentation."""
+"""Short explanations of arguments, draws and infos, for the tables in a task's documentation."""
 
 from __future__ import annotations
 
 import inspect
 import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
+from physics.keywords import nearest_first
 from rigid_env.tasks.draws import parameter_of
 from rigid_env.tasks.parameters import WALL_PARAMETERS
+
+if TYPE_CHECKING:
+    from rigid_env.tasks.declaration import Declaration
 
 ARGUMENTS = {
     "accuracy": "preset of the engine, a `physics.Accuracy`, or a dict of its settings",
@@ -33,6 +39,9 @@ OF_ENVIRONMENTS = {
 }
 """Explanations of the arguments that environments add to those of a task, by name."""
 
+OWN_CAMERA = "of pictures: a `rigid_env.rendering.Camera`, or a dict of its parameters; None takes that of the task"
+"""Explanation of the argument `camera` of a task that declares one."""
+
 PARAMETERS = {
     "mass": "mass [kg]",
     "size": "edges or diameters [m]",
@@ -57,6 +66,23 @@ def draw_meaning(name: str) -> str:
     if parameter in WALL_PARAMETERS:
         return PARAMETERS[parameter].replace("of walls", f"of wall {part}")
     return f"{PARAMETERS[parameter]} of body {part}"
+
+
+def explanations_of(task: Declaration) -> dict[str, str]:
+    """Explanations that a task declares in `explanations`, those of its base classes included, by key of infos."""
+    found: dict[str, str] = {}
+    for owner in reversed(type(task).__mro__):
+        found |= vars(owner).get("explanations", {})
+    return {**found, **task.explanations}  # those of the task itself last
+
+
+def check_explanations(task: Declaration, keys: Iterable[str]) -> None:
+    """Raise a ValueError if a task's own `explanations` explain a key that is not among the `keys` of its infos."""
+    own = vars(type(task)).get("explanations", {})
+    unknown = sorted(set(own) - set(keys))
+    if unknown:
+        known = ", ".join(nearest_first(unknown[0], keys))
+        raise ValueError(f"explanations of {type(task).__name__} have {unknown[0]!r}; allowed are {known}")
 
 
 def argument_meaning(kind: type, name: str) -> str:

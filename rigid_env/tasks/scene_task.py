@@ -27,6 +27,23 @@ START = "a start as far off as it may be"
 """Subject of the error for starts inside a wall."""
 
 
+START_MEANINGS = {
+    "pos": "the starting position [m]",
+    "linvel": "the starting velocity [m/s]",
+    "angvel": "the starting angular velocity [rad/s]",
+}
+"""Explanations of the draws of a start, by key of the table [environment.start]."""
+
+GOAL_MEANINGS = {
+    "goal": "place of the goal [m]",
+    "distance": "distance of the body from the goal [m]",
+    "speed": "speed of the body [m/s]",
+    "reward_progress": "gain of closeness to the goal",
+    "reward_success": "bonus for success",
+}
+"""Explanations of draws, measures and terms of a scene with a goal."""
+
+
 @dataclass(frozen=True)
 class SceneArgument:
     """Argument for the scene of an environment; see `SceneTask`."""
@@ -79,6 +96,8 @@ class SceneTask(Task):
         self.actions = [Wrench(body, **limits) for body in settings.driven]
         self.draws = self._declared()
         self._reader = reader  # for errors, as long as the task is made
+        self.explanations = {f"start_{key}": f"change of {START_MEANINGS[key]} of each body" for key in settings.start}
+        self.explanations |= {} if settings.goal is None else GOAL_MEANINGS
         self.memory = {} if settings.goal is None else {"closeness": 1, "gain": 1}
         super().__init__(
             given.worlds, draws=given.draws, frame_skip=settings.frame_skip, dt=settings.dt,

@@ -27,6 +27,7 @@ from rigid_env.tasks.disturbances import Disturbances, Push
 from rigid_env.tasks.draws import Draws, check_draws
 from rigid_env.tasks.entries import Observation
 from rigid_env.tasks.functions import Functions
+from rigid_env.tasks.meanings import check_explanations
 from rigid_env.tasks.options import require_known
 from rigid_env.tasks.replacing import checked_effects
 from rigid_env.tasks.starts import Starts, distributions_of
@@ -98,6 +99,8 @@ class Task(Starts):
         Declared: control steps after which Gymnasium truncates an episode.
     ends_on_success : bool
         Declared: False lets an episode continue after success.
+    explanations : mapping of str to str
+        Declared: explanations of measures, draws and terms of the reward, for documentation; see `Declaration`.
     world : physics.World
         All worlds of the batch.
     generators : list of numpy.random.Generator or None
@@ -155,6 +158,7 @@ class Task(Starts):
         self._undo = self._keeper()
         self.info_names = (*self.measures, *(f"reward_{term}" for term in self.terms))
         refuse_same_keys(type(self).__name__, self.info_names, self.drawn)
+        check_explanations(self, (*self.info_names, *self.drawn))
 
     def __init_subclass__(cls, **keywords: Any) -> None:
         super().__init_subclass__(**keywords)

@@ -75,6 +75,8 @@ class Goal:
         normal = floors[0].normal if floors else np.array((0.0, 1.0, 0.0))
         height = normal @ goal.pos - floors[0].offset if floors else 0.0
         foot = goal.pos + (LIFT * self._placement.unit - height) * normal
+        if goal.axis is not None:
+            foot, normal = goal.pos, goal.axis
         if not self._disc:
             self._disc = [
                 self._add("disc", *_disc(), goal, DISC_OPACITY), self._add("ring", *_ring(), goal, None)

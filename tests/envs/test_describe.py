@@ -181,7 +181,7 @@ def test_a_task_of_ones_own_is_described_from_its_declaration():
     task = Pair(name="x")
     text = describe(task)
     assert section(text, "Description").strip().split("\n\n")[1:] == [
-        "A second paragraph.", "Bodies: 0 Block of 2 kg; 1 Block of 3 kg. Walls: 0. Effects: none.",
+        "A second paragraph.", "Bodies: 0 Block of 2 kg; 1 Block, mass drawn. Walls: 0. Effects: none.",
     ]  # fmt: skip
     assert rows(text, "Action Space") == [
         ["0", "force along body axis y of body 1 at (0.5, 0, 0) m", "-1", "1", "0.5 m g", "right"],
@@ -200,6 +200,43 @@ def test_a_task_of_ones_own_is_described_from_its_declaration():
     assert rows(text, "Arguments")[:2] == [
         ["`reach`", "2.0", "Distance that counts as near [m]."], ["`name`", "required", ""],
     ]  # fmt: skip
+
+
+class Explained(Pair):
+    explanations = {"side": "side [m]", "apart": "distance [m]", "reward_a|b": "count"}  # noqa: RUF012
+    ends_on_success = False
+
+    def measure(self, worlds):
+        return {"apart": np.ones(len(worlds))}
+
+
+class Again(Explained):
+    explanations = {"apart": "distance of both [m]"}  # noqa: RUF012
+
+
+def test_a_task_explains_its_draws_measures_and_terms():
+    text = describe(Again(name="x"))
+    assert rows(text, "Starting State")[1] == ["`side`", "1", "1", "side [m]"]
+    assert "| `apart` | distance of both [m] |" in text
+    assert "| `reward_a\\|b` | count |" in text
+
+
+def test_an_explanation_of_nothing_is_refused():
+    class Wrong(Explained):
+        explanations = {"aprat": "distance [m]"}  # noqa: RUF012
+
+    with pytest.raises(ValueError, match="explanations of Wrong have 'aprat'; allowed are apart, reward_a"):
+        Wrong(name="x")
+
+
+def test_success_that_ends_no_episode_is_no_termination():
+    text = section(describe(Explained(name="x")), "Episode End")
+    assert text.startswith("\nTermination: never. Success does not end an episode. Both are near.\n")
+
+
+def test_a_mass_that_is_drawn_is_no_number():
+    assert "1 Block, mass drawn." in describe(Pair(name="x"))
+    assert "Bodies: 0 Block, mass drawn." in BlockReachEnv(mass=(4.0, 8.0)).describe()
 
 
 def test_effects_take_draws_out_of_the_tables():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ from scipy.integrate import solve_ivp
 
 import physics
 import rigid_env  # noqa: F401 (registers)
+from rigid_env.rendering.camera_argument import as_camera
+from rigid_env.rendering.view import frame_of
 from rigid_env.suite import ball_kick
 from rigid_env.suite.ball_kick import BRUSH, LENGTHS, MASS, RADIUS, SPEED, TURN, BallKick, G, controller, least_distance
 
@@ -126,6 +130,51 @@ def test_only_topspin_brings_a_ball_over_the_post_in_time(wind):
                 assert not is_hit.any()
             elif (distance, height) == (16.0, 2.2):
                 assert is_hit.any()
+
+
+def flights(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (k, 3) of the ball on the controller's kicks to `count` random rings, and the centres of these rings."""
+    rng, ring_draw = np.random.default_rng(0), BallKick.draws["ring"]
+    rings, wind = rng.uniform(ring_draw.low, ring_draw.high, (count, 3)), np.zeros((count, 3))
+    wind[:, ::2] = rng.uniform(-5.0, 5.0, (count, 2))
+    centre = np.array((0.0, RADIUS, 0.0))
+    spins = (np.tile((0.0, turn, 0.0), (count, 1)) for turn in (-ball_kick.AIMING_SPIN, ball_kick.AIMING_SPIN))
+    return np.concatenate(
+        [ball_kick.aim(rings - centre, spin, wind)[1].reshape(-1, 3) for spin in spins]
+    ) + centre, rings
+
+
+def test_its_pictures_show_ball_post_and_ring_over_the_whole_flight():
+    """The ring's lowest point and its highest are at most its radius from the centre."""
+    width, height = size = (480, 300)
+    ball, rings = flights(200)
+    around = ball_kick.RING * np.concatenate([np.eye(3), -np.eye(3)])[:, None]
+    post = BallKick.scene.bodies[1]
+    corners = np.array(post.pos) + 0.5 * np.array(post.size) * np.array(np.meshgrid(*3 * [(-1, 1)])).reshape(3, -1).T
+    pixels, depths = as_camera(BallKick.camera).project(np.concatenate([ball, *(rings + around), corners]), size)
+    assert (depths > 0.0).all()
+    assert (pixels > 0.0).all()
+    assert (pixels < (width, height)).all()
+
+
+@pytest.mark.interpreted
+def test_its_ring_is_where_it_is_drawn():
+    """Pixels of the ring's rim have another colour than without a goal, and the disc on the floor is not there."""
+    pytest.importorskip("pygame")
+    env = gym.make(ENV, render_mode="rgb_array", width=480, height=300).unwrapped
+    _, info = env.reset(seed=0)
+    task = env.task
+    camera = as_camera(task.camera)
+    with_ring, without = env.render().astype(int), env._view.draw_frame(task, replace(frame_of(task), goal=None))
+    is_other = np.abs(with_ring - without).sum(axis=2) > 30
+    turns = np.linspace(0.0, 2.0 * np.pi, 13)
+    rim = info["ring"] + ball_kick.RING * np.stack([0 * turns, np.cos(turns), np.sin(turns)], axis=1)
+    pixels = camera.project(rim, (480, 300))[0].astype(int)
+    assert all(is_other[y - 1 : y + 2, x - 1 : x + 2].any() for x, y in pixels)
+    foot = np.array((info["ring"][0], 0.0, info["ring"][2]))
+    across = np.array((0.0, 0.0, ball_kick.RING))
+    edge = camera.project(np.stack([foot - across, foot + across]), (480, 300))[0].astype(int)
+    assert not any(is_other[y, x] for x, y in edge)
 
 
 def test_later_actions_have_no_effect():

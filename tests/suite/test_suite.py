@@ -17,7 +17,8 @@ import rigid_env  # noqa: F401 (registers)
 from physics import PRESETS
 from rigid_env import check_task
 from rigid_env.envs.controllers import CONTROLLERS, load_controller
-from rigid_env.envs.registration import SUITE
+from rigid_env.envs.registration import GOALS, MAX_EPISODE_STEPS, SUITE
+from rigid_env.tasks import kernels
 from tests.suite.rates import RATES
 from tests.tiers.sweep import sweep
 
@@ -72,6 +73,26 @@ def test_its_documentation_has_every_section(name):
     titles = re.findall(r"^ *## (.+)$", doc, re.MULTILINE)
     assert titles == ["Description", "Rewards", "Starting State", "Episode End", "Version History"]
     assert f"{SUITE[name]}" in " ".join(doc.split("## Episode End")[1].split())
+
+
+@pytest.mark.interpreted
+@pytest.mark.parametrize("name", [*SUITE, *GOALS, *MAX_EPISODE_STEPS])
+def test_its_documentation_explains_every_number_once(name):
+    text = gym.make(env_id(name)).unwrapped.describe()
+    for vague in ("the task's own |", "measured by the task", "term of the reward"):
+        assert vague not in text
+    assert text.count("Truncation") == 1
+
+
+@pytest.mark.parametrize("name", GOALS)
+def test_success_with_a_goal_ends_no_episode(name):
+    text = " ".join(gym.make(env_id(name)).unwrapped.describe().split())
+    assert "Termination: never. Success is `s <= 1`, in every control step anew" in text
+    tolerances = (kernels.REACH_TOLERANCE if "Reach" in name else kernels.REORIENT_TOLERANCE,
+                  kernels.REST_SPEED, kernels.REST_SPIN)  # fmt: skip
+    letter = "d" if "Reach" in name else "a"
+    ratios = ", ".join(f"{each} / {number:g}" for each, number in zip((letter, "v", "w"), tolerances))
+    assert f"the shortfall `s = max({ratios})`" in text
 
 
 @pytest.mark.parametrize("name", sweep([name for name in SUITE if env_id(name) in CONTROLLERS], quick))
