@@ -207,7 +207,7 @@ NARROWPHASE = [
         "narrowphase/box_sat.py",
         "PARALLEL_COSINE = 1.0 - 5.0e-15",
         "PARALLEL_COSINE = 2.0",
-        "physics/test_pushed_blocks.py::test_no_part_is_above_the_allowed_error",
+        "kernels/test_parallel_faces.py::test_contacts_keep_their_ids_under_error_control",
     ),
     _mutant(
         "narrowphase-corner",
