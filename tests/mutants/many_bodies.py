@@ -202,6 +202,14 @@ NARROWPHASE = [
         "kernels/test_many.py::test_the_normal_of_two_blocks_separates_them_most",
     ),
     _mutant(
+        "narrowphase-parallel",
+        "Of two faces that lie on each other, rounding says which one is clipped.",
+        "narrowphase/box_sat.py",
+        "PARALLEL_COSINE = 1.0 - 5.0e-15",
+        "PARALLEL_COSINE = 2.0",
+        "kernels/test_parallel_faces.py::test_contacts_keep_their_ids_under_error_control",
+    ),
+    _mutant(
         "narrowphase-corner",
         "The gap of a hull's corner to a wall is that of the opposite corner.",
         "narrowphase/body_wall.py",
@@ -456,6 +464,14 @@ STEPPING = [
         "return _mean_slip_target_of_parts(k, t, u, many)",
         "return t",
         "physics/test_refine.py::test_a_block_that_slides_and_turns_takes_long_parts",
+    ),
+    _mutant(
+        "stepping-held",
+        "A corner of a face whose load comes back must close its gap first.",
+        "stepping/foretold_twists.py",
+        "return many.contacts.impulse[k, 0] > 0.0 or _is_beside_pushing(k, 1, many) or _is_beside_pushing(k, -1, many)",
+        "return many.contacts.impulse[k, 0] > 0.0",
+        "physics/test_pushed_blocks.py::test_no_part_is_above_the_allowed_error",
     ),
     _mutant(
         "stepping-restitution",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from physics.compiler.decorators import inlined
+from physics.compiler.decorators import if_given, inlined
 from physics.kernels.math.vector import row_vector
 from physics.kernels.multibody.data.contact_set import pair_slop, subtract
 
@@ -23,6 +23,9 @@ PARALLEL_SINE_SQUARED = 1.0e-12
 # faces count as lying flat on each other (11 degrees). One point or one edge would let them tip to and fro. So they
 # touch with the clipped face, at the separation along the product of edges.
 FLAT_COSINE = 0.98
+
+# Cosine of the angle between two face normals (1e-7) above which the faces are parallel under error control.
+PARALLEL_COSINE = 1.0 - 5.0e-15
 
 # Rows of `many.narrowphase.relative_axes` (`write_relative_axes`).
 AXES, SIZES, FROM_A, FROM_B = 0, 1, 2, 3
@@ -52,12 +55,27 @@ def write_relative_axes(a, b, many):
         mix[FROM_B, 0, i] = R[b, i] * d[0] + R[b, 3 + i] * d[1] + R[b, 6 + i] * d[2]
 
 
+def _never(cosine, many):
+    return False
+
+
+@if_given("many.even", _never)
+def are_faces_parallel(cosine, many):
+    """True if two faces, with this cosine of the angle between their lines of normals, are parallel.
+
+    Slops are tiny under error control, so that of two faces that lie on each other now one and now the other would
+    separate by a slop more. Contacts would change their ids each time, and lose their warm start.
+    """
+    return cosine >= PARALLEL_COSINE
+
+
 @inlined
 def max_box_face_separation(a, b, margin, many):
     """Find the face normal along which blocks a and b are farthest apart: (separation [m], face).
 
     Faces 0 to 2 are those across the axes of a, 3 to 5 those of b. A later face is taken only if it separates by a slop
-    more, so that ties go to block a. The search stops at a face that separates by more than `margin` [m].
+    more, so that ties go to block a, and so do faces that are parallel (`are_faces_parallel`). The search stops at a
+    face that separates by more than `margin` [m].
     """
     S, da, db = many.narrowphase.relative_axes[SIZES], many.bodies.body[a].dims, many.bodies.body[b].dims
     way_a, way_b = many.narrowphase.relative_axes[FROM_A, 0], many.narrowphase.relative_axes[FROM_B, 0]
@@ -69,11 +87,12 @@ def max_box_face_separation(a, b, margin, many):
             return s, i
         if s > best + slop:
             best, face = s, i
+    first = face
     for j in range(3):
         s = abs(way_b[j]) - (db[j] + (da[0] * S[0, j] + da[1] * S[1, j] + da[2] * S[2, j]))
         if s > margin:
             return s, 3 + j
-        if s > best + slop:
+        if s > best + slop and not are_faces_parallel(S[first, j], many):
             best, face = s, 3 + j
     return best, face
 

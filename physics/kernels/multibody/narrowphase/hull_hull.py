@@ -32,7 +32,7 @@ from physics.kernels.multibody.data.hull_tables import (
     LAST_EDGE,
     LAST_FACE,
 )
-from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE, PARALLEL_SINE_SQUARED
+from physics.kernels.multibody.narrowphase.box_sat import FLAT_COSINE, PARALLEL_SINE_SQUARED, are_faces_parallel
 from physics.kernels.multibody.narrowphase.hull_clip import (
     CLIP_SIDE_OFFSET,
     clip_incident_face,
@@ -228,6 +228,17 @@ def _add_edge_contact(a, b, i, j, n, gap, h, many):
     add_contact(a, b, feature, -1, (-n[0], -n[1], -n[2]), (on_a, on_b), gap, h, many)
 
 
+def _never(face, other, many):
+    return False
+
+
+@if_given("many.even", _never)
+def _are_parallel(face, other, many):
+    """True if `face` of polyhedron 0 and face `other` of polyhedron 1 lie on each other (`are_faces_parallel`)."""
+    n, m = row_vector(many.narrowphase.hulls.normal[0], face, 0), row_vector(many.narrowphase.hulls.normal[1], other, 0)
+    return are_faces_parallel(-qt.dot(n, m), many)
+
+
 @kernel
 def collide_hulls(a, b, margin, h, many):
     """Add the contacts of polyhedra a and b (hulls or blocks) that are at most `margin` [m] apart.
@@ -238,7 +249,8 @@ def collide_hulls(a, b, margin, h, many):
     unless that part is farther away.
 
     The face of a is preferred unless that of b separates by a slop more, and a face is preferred to edges likewise: a
-    choice between equals must not change with rounding. h is the length of the stage [s].
+    choice between equals must not change with rounding. Under error control parallel faces are equals. h is the length
+    of the stage [s].
     """
     origin, slop = row_vector(many.bodies.center, a, 0), pair_slop(a, b, many)
     pose_hull(0, a, origin, many)
@@ -246,7 +258,7 @@ def collide_hulls(a, b, margin, h, many):
     apart, face = max_hull_face_separation(0, a, b, margin, many)
     other, other_face = max_hull_face_separation(1, b, a, margin, many)
     which, r, o = 0, a, b
-    if other > apart + slop:
+    if other > apart + slop and not _are_parallel(face, other_face, many):
         apart, face, which, r, o = other, other_face, 1, b, a
     if apart > margin:
         return

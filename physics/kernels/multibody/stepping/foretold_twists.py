@@ -18,6 +18,7 @@ from physics.compiler.decorators import if_given, inlined, kernel
 from physics.kernels.math import quaternion as qt
 from physics.kernels.math.vector import as_vector, minus, plus, row_vector, times
 from physics.kernels.multibody.data.arrays import (
+    NUM_CONTACTS,
     WARM_BODY_A,
     WARM_BODY_B,
     WARM_CONTACT_COUNT,
@@ -26,7 +27,7 @@ from physics.kernels.multibody.data.arrays import (
     WARM_IMPULSE,
     WARM_STAGE_LENGTH,
 )
-from physics.kernels.multibody.data.contact_set import put_vector, relative_acceleration_bound, row_matrix
+from physics.kernels.multibody.data.contact_set import pair_slop, put_vector, relative_acceleration_bound, row_matrix
 from physics.kernels.multibody.data.warm_start import load_warm_impulses
 from physics.kernels.multibody.stepping.allowed_error import allowed_depth
 from physics.kernels.state.body import angular_velocity, read_state
@@ -137,17 +138,34 @@ def is_foretold(many):
     return True
 
 
+@inlined
+def _is_beside_pushing(k, step, many):
+    """True if a later contact of the same pair as contact k (`step` = 1) has pushed, or an earlier one (-1).
+
+    Contact k must have no larger gap than that one, except for a slop.
+    """
+    a, b, m = many.contacts.bodies[k, 0], many.contacts.bodies[k, 1], k + step
+    least = many.contacts.gap[k] - pair_slop(a, b, many)
+    while 0 <= m < many.counts[NUM_CONTACTS] and many.contacts.bodies[m, 0] == a and many.contacts.bodies[m, 1] == b:
+        if many.contacts.impulse[m, 0] > 0.0 and many.contacts.gap[m] >= least:
+            return True
+        m += step
+    return False
+
+
 def _never(k, many):
     return False
 
 
 @if_given("many.even", _never)
 def is_held(k, many):
-    """True if contact k has pushed in the stage before: then it stays in contact, whatever its gap at the middle is.
+    """True if contact k stays in contact, whatever its gap at the middle is: it has pushed in the stage before.
 
-    That gap is an error of third order in the length of the stage. The contacts have the warm start.
+    That gap is an error of third order in the length of the stage. A contact without load that lies no farther than one
+    of its face that has pushed stays, too: where a load leaves a corner of a face and comes back, nothing must jump.
+    The contacts have the warm start.
     """
-    return many.contacts.impulse[k, 0] > 0.0
+    return many.contacts.impulse[k, 0] > 0.0 or _is_beside_pushing(k, 1, many) or _is_beside_pushing(k, -1, many)
 
 
 def _closes_alike(k, gap, many):
