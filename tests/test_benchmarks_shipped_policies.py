@@ -15,18 +15,15 @@ from rigid_env.envs.pretrained import pretrained_ids
 CURL = "rigid_env/BlockCurl-v0"
 
 
-NOT_YET = {"rigid_env/BlockPush-v0"}  # minutes of many contacts; its page tells no rate of its policy
-
-
 def test_policies_have_been_judged_on_fresh_episodes():
     found = program.read_shipped()
-    assert set(found) == {*pretrained_ids()} - NOT_YET
+    assert set(found) == {*pretrained_ids()}
     for row in found.values():
         assert row["evaluation"]["episodes"] == program.EPISODES
         assert row["evaluation"]["seed"] == program.FRESH
 
 
-@pytest.mark.parametrize("env_id", sorted({*pretrained_ids()} - NOT_YET))
+@pytest.mark.parametrize("env_id", sorted(pretrained_ids()))
 def test_the_seed_of_a_policy_is_one_of_the_suite(env_id):
     row = program.read_shipped()[env_id]
     found, _ = read_results(program.RESULTS, env_id)
