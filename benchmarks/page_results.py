@@ -21,8 +21,10 @@ WHY_MISSING = {
 """Reasons for agents that are missing, by environment; a page shows its reason while one is missing."""
 
 ABOUT_ACCURACIES: dict[str, str] = {
-    "rigid_env/BlockStack-v0": "Seed 1 lands with sideways speed. Of its first 60 episodes it fails 12 at `precise`, all of them within 30 "
-    "control steps, by moving B: A is 27 to 620 times as heavy there. At `balanced` it fails one.",
+    "rigid_env/BlockStack-v0": (
+        "Seed 1 lands with sideways speed. Of its first 60 episodes it fails 12 at `precise`, all of them within 30 "
+        "control steps, by moving B: A is 27 to 620 times as heavy there. At `balanced` it fails one."
+    ),
 }
 """Paragraphs under the table of accuracies, by environment."""
 

@@ -1,4 +1,4 @@
-"""Which of two faces that lie on each other is clipped must not depend on rounding, however small the slop is."""
+"""Rounding must not choose which of two faces that lie on each other is clipped, however small the slop is."""
 
 from __future__ import annotations
 
