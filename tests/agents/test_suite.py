@@ -57,7 +57,7 @@ def here(monkeypatch):
 def run(*options, code=0):
     app = typer.Typer()
     app.command()(program.main)
-    done = CliRunner().invoke(app, [*map(str, options)])
+    done = CliRunner().invoke(app, [*map(str, options)], env={"COLUMNS": "200"})
     assert done.exit_code == code, done.output
     return " ".join(done.output.split())
 
